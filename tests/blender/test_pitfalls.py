@@ -52,6 +52,24 @@ def test_attributes_have_any_domain(shapes):
     assert colours == pytest.approx(np.tile([0.1, 0.2, 0.7], (len(colours), 1)))
 
 
+def test_a_tiled_image_below_a_correction_is_baked_over_its_own_square(scene):
+    uv = np.random.default_rng(1).random((500, 2))
+    ray = mi.Ray3f(mi.Point3f(*(uv - 0.5).T * 0.5 + [[-3.0], [-2.0]], 1.0), mi.Vector3f(0.0, 0.0, -1.0))
+    si = scene.ray_intersect(ray)
+    found = np.array(si.bsdf().eval_diffuse_reflectance(si)).T
+    angle, (u, v) = 0.5, (uv * [8.0, 5.0]).T
+    x, y = np.cos(angle) * u - np.sin(angle) * v, np.sin(angle) * u + np.cos(angle) * v
+    wanted = np.stack([x % 1.0 <= 0.5, y % 1.0 <= 0.5, np.ones_like(x)], axis=1)
+    assert (np.abs(found - wanted).max(axis=1) < 0.02).mean() > 0.9  # the rest are edges
+
+
+def test_a_channel_of_an_image_is_not_baked(exported, shapes):
+    parameters = mi.traverse(shapes["Packed"].bsdf())
+    sizes = {np.array(value).shape[:2] for key, value in parameters if key.endswith("data")}
+    assert sizes == {(16, 16)}
+    assert not [note for note in exported[1]["notes"] if note["object"].startswith("packed")]
+
+
 def test_a_blank_name_is_that_of_the_attribute_of_renders(shapes):
     assert values(shapes["Unnamed"].bsdf(), "reflectance.value") == pytest.approx([0.1, 0.7, 0.1], abs=2e-3)
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bakes what has no counterpart in Mitsuba: Cycles evaluates a node's output over the mesh, into a texture.
 
-A value of images and colour corrections alone is baked once over the unit square of texture coordinates.
+A value of images and colour corrections alone is baked once over the unit square of the images' coordinates.
 Any other is baked for each object, over texture coordinates that are made for it; then all textures of the
 material are, since a mesh has one set of coordinates in Mitsuba.
 """
@@ -104,9 +104,11 @@ class Bakery:
         if key not in self._of_uv:
             sizes = [max(image.size) for image in _images(value.output)]
             size = int(min(max([CONSTANT_PX, *sizes]), self._job.bake_px))
-            with self._stage().square(value.uv_map) as canvas:
+            with self._stage().square(value.uv_map, value.matrix) as canvas:
                 pixels, _ = canvas.bake(value.output, material, size, _kind(value))
-            self._of_uv[key] = self._stored(pixels, None, value, material.name, value.uv_map)
+            stored = self._stored(pixels, None, value, material.name, value.uv_map)
+            is_file = isinstance(stored, Texture)
+            self._of_uv[key] = replace(stored, matrix=value.matrix) if is_file else stored
         return self._of_uv[key]
 
     def _over_mesh(self, value: Any, material: Any, canvas: Any, placed: Placed, size: int) -> Any:
@@ -215,7 +217,7 @@ def _of_mesh(value: Any, mesh: Mesh, *, has_several: bool) -> Any:
 
     So are images of the extension Clip whose border lies on the mesh: Mitsuba has no such texture.
     """
-    if isinstance(value, ImageValue) and value.output.node.extension == "CLIP":
+    if isinstance(value, ImageValue) and value.node.extension == "CLIP":
         uv, matrix = mesh.uvs.get(value.uv_map or mesh.active_uv, np.zeros(2)), np.array(value.matrix)
         place = uv @ matrix[:2, :2].T + matrix[:2, 2]
         is_beyond = np.abs(place - 0.5).max(initial=0.0) > 0.5 + BORDER

@@ -14,7 +14,7 @@ import numpy as np
 from enfilade_blender.image_files import F32
 from enfilade_blender.materials.image_pixels import linear_pixels
 from enfilade_blender.materials.stand_ins import put_stand_ins
-from enfilade_blender.materials.values import Output
+from enfilade_blender.materials.values import IDENTITY, Matrix3, Output
 from enfilade_blender.ply import Mesh
 from enfilade_blender.records import Placed
 
@@ -69,16 +69,17 @@ class BakeScene:
             yield canvas
 
     @contextmanager
-    def square(self, uv_map: str) -> Iterator[Canvas]:
-        """The unit square, which is its own texture coordinates, by the name of a UV map."""
+    def square(self, uv_map: str, matrix: Matrix3 = IDENTITY) -> Iterator[Canvas]:
+        """The unit square of coordinates that a map makes of a UV map, by its name."""
         corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
         triangles = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
         normals = np.broadcast_to(np.array([0.0, 0.0, 1.0], np.float32), (2, 3, 3))
-        uv = corners[triangles][..., :2]
+        uv, inverse = corners[triangles][..., :2], np.linalg.inv(matrix)
         name, slots = uv_map or "UVMap", np.zeros(2, np.int32)
-        with self._canvas(
-            _data(Mesh(corners, triangles, normals, {name: uv}, {}, slots, name)), np.eye(4)
-        ) as canvas:
+        uvs = {name: uv @ inverse[:2, :2].T + inverse[:2, 2], TARGET: uv}
+        data = _data(Mesh(corners, triangles, normals, uvs, {}, slots, name))
+        data.uv_layers.active = data.uv_layers[-1]
+        with self._canvas(data, np.eye(4)) as canvas:
             yield canvas
 
     def light_colour(self, light: Any, output: Output) -> tuple[float, float, float]:

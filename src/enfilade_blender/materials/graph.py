@@ -116,8 +116,9 @@ class Graph:
             effect = "a mid grey is in its place"
             self._notes.add("approximated", self._owner, node.name, "there is no image", effect)
             return Constant((0.5, 0.5, 0.5))
-        if node.type == "TEX_IMAGE" and (coordinates := image_coordinates(node, found.groups)):
-            return ImageValue(found, *coordinates)
+        texture = _texture(found)
+        if texture and (coordinates := image_coordinates(texture.node, texture.groups)):
+            return ImageValue(found, *coordinates, texture.node)
         return Procedural(found, *_dependence(found), is_number)
 
     def normal(self, socket: Any, groups: tuple[Any, ...]) -> Normal:
@@ -360,19 +361,29 @@ def is_of_view(output: Output) -> bool:
     )
 
 
-def _dependence(output: Output) -> tuple[str | None, bool]:
-    """UV map of which alone an output is a periodic function, or None; and whether it depends on the view."""
-    is_of_uv, uv_maps = True, set()
+def _dependence(output: Output) -> tuple[str | None, Matrix3, bool]:
+    """UV map of which alone an output is a function, or None; its matrix; whether it depends on the view."""
+    is_of_uv, places = True, set()
     for found in upstream(output, below_images=False):
         node = found.node
         if node.type == "TEX_IMAGE":
             coordinates = image_coordinates(node, found.groups)
-            is_of_uv &= coordinates is not None and coordinates[1] == IDENTITY and node.extension == "REPEAT"
-            uv_maps.add(coordinates[0] if coordinates else "")
+            is_of_uv &= coordinates is not None and node.extension == "REPEAT"
+            places.add(coordinates or ("", IDENTITY))
         else:
             is_of_uv &= node.type in table.COLOUR_NODES
-    is_of_uv &= len(uv_maps) <= 1
-    return (next(iter(uv_maps), "") if is_of_uv else None), is_of_view(output)
+    uv_map, matrix = next(iter(places), ("", IDENTITY))
+    is_of_uv &= len(places) <= 1 and mapping.is_invertible(matrix)
+    return (uv_map if is_of_uv else None), matrix, is_of_view(output)
+
+
+def _texture(found: Output) -> Output | None:
+    """The output of an image texture that an output is, or is a channel of; None for others."""
+    if found.node.type in table.SPLITTING and getattr(found.node, "mode", "RGB") == "RGB":
+        colour = follow(found.node.inputs[0], found.groups)
+        is_split = isinstance(colour, Output) and colour.socket.name == "Color"
+        found = colour if is_split else found
+    return found if found.node.type == "TEX_IMAGE" else None
 
 
 def _is_of_uv(value: Value) -> bool:

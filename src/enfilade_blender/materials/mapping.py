@@ -96,6 +96,11 @@ def product(first: Matrix3, second: Matrix3) -> Matrix3:
     return _rows(np.array(first) @ np.array(second))
 
 
+def is_invertible(matrix: Matrix3) -> bool:
+    """Whether a map has an inverse that single precision holds."""
+    return bool(abs(np.linalg.det(matrix)) > 1e-9)
+
+
 def spot_ramp(half_angle: float, blend: float) -> tuple[float, float]:
     """Angles (outer, inner; radians) of a linear ramp with the width of Blender's spot of a blend.
 

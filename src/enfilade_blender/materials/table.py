@@ -61,6 +61,8 @@ COLOUR_NODES = {  # functions of their inputs alone
     "CURVE_VEC", "GAMMA", "BRIGHTCONTRAST", "HUE_SAT", "INVERT", "SEPRGB", "COMBRGB", "SEPARATE_COLOR",
     "COMBINE_COLOR", "SEPXYZ", "COMBXYZ", "CLAMP", "MAP_RANGE", "RGBTOBW", "BLACKBODY", "WAVELENGTH",
 }  # fmt: skip
+CHANNELS = {"Red": 0, "Green": 1, "Blue": 2, "R": 0, "G": 1, "B": 2, "X": 0, "Y": 1, "Z": 2}  # of outputs
+SPLITTING = ("SEPARATE_COLOR", "SEPRGB", "SEPXYZ")  # nodes of such outputs
 VIEW_NODES = {"FRESNEL", "LAYER_WEIGHT", "LIGHT_PATH", "CAMERA"}
 VIEW_SOCKETS = {"TEX_COORD": ("Camera", "Window", "Reflection"), "NEW_GEOMETRY": ("Incoming", "Backfacing")}
 PLACE_SOCKETS = {  # in the space of the world
@@ -126,7 +128,7 @@ PRINCIPLED = (
 INPUTS = (
     ("Constants, RGB, Value", "mapped", "numbers"),
     (
-        "Image Texture with UV Map and Mapping",
+        "Image Texture with UV Map and Mapping, or a channel of it",
         "mapped",
         "`bitmap` with `to_uv`, `wrap_mode`, `filter_type`, `raw`",
     ),
@@ -136,7 +138,7 @@ INPUTS = (
         "`mesh_attribute`; baked: light, its alpha or number, several in one material, what nodes make of it",
     ),
     ("Image of the extension Clip whose border lies on the mesh", "baked", "a bitmap of each mesh"),
-    ("Colour corrections of images on the UV map", "baked", "a bitmap over the unit square of UV"),
+    ("Colour corrections of images on the UV map", "baked", "a bitmap over the unit square of the images"),
     ("Baked heights and normals", "baked", "OpenEXR files of 32 bits"),
     (
         "Everything else: noise, ramps, Object and Generated coordinates",

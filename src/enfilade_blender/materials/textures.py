@@ -16,6 +16,7 @@ from enfilade_blender.materials.image_pixels import (
     is_missing,
     linear_pixels,
 )
+from enfilade_blender.materials.table import CHANNELS
 from enfilade_blender.materials.values import (
     LUMINANCE,
     AttributeValue,
@@ -125,7 +126,9 @@ class Textures:
             return self.stored(value.file, raw=value.raw)
         if value.output.socket.name == "Alpha":
             return np.repeat(linear_pixels(value.image)[..., 3:], 3, axis=-1)
-        return image_colours(value.output.node)
+        channel = CHANNELS.get(value.output.socket.name)
+        colours = image_colours(value.node)
+        return colours if channel is None else np.repeat(colours[..., channel, None], 3, axis=-1)
 
     def numbers(self, value: ImageValue | Texture) -> F32:
         """Numbers of a texture (H, W, 1), the luminance of its colours."""
@@ -214,25 +217,25 @@ class Textures:
     def _bitmap(self, value: ImageValue | Texture, file: str, *, raw: bool) -> Element:
         """A file of a value's numbers, or of others, looked up as the value is."""
         if isinstance(value, Texture):
-            return bitmap(file, raw=raw, wrap="repeat", matrix=FLIP)
-        node = value.output.node
+            return bitmap(file, raw=raw, wrap="repeat", matrix=FLIP @ np.array(value.matrix))
+        node = value.node
         matrix = FLIP @ np.array(value.matrix)
         smooth = node.interpolation != "Closest"
         return bitmap(file, raw=raw, wrap=WRAP.get(node.extension, "repeat"), matrix=matrix, smooth=smooth)
 
     def _file(self, value: ImageValue) -> tuple[str, bool]:
         """Name of a value's file, and whether its numbers are linear."""
-        image, is_alpha = value.image, value.output.socket.name == "Alpha"
-        raw = is_alpha or image.colorspace_settings.name in RAW_SPACES
+        image, socket = value.image, value.output.socket.name
+        raw = socket != "Color" or image.colorspace_settings.name in RAW_SPACES
         key = _key(value)
         if key not in self._files:
             name = Path(image.name).stem or "image"
-            if is_alpha:
-                file = self.write(f"{name} alpha", linear_pixels(image)[..., 3:], raw=True)
+            if socket != "Color":
+                is_exact, numbers = image.is_float, self.pixels(value)[..., :1]
+                file = self.write(f"{name} {socket.lower()}", numbers, raw=True, is_exact=is_exact)
             else:
-                file = self._copied(image, name) if is_as_stored(value.output.node) else ""
-                colours = image_colours(value.output.node)
-                file = file or self.write(name, colours, raw=raw, is_exact=image.is_float)
+                file = self._copied(image, name) if is_as_stored(value.node) else ""
+                file = file or self.write(name, self.pixels(value), raw=raw, is_exact=image.is_float)
             self._files[key] = file
         return self._files[key], raw
 
@@ -275,5 +278,5 @@ def file_stem(name: str) -> str:
 
 def _key(value: ImageValue) -> tuple[Any, ...]:
     """What the numbers of a value depend on."""
-    outputs = value.output.node.outputs
+    outputs = value.node.outputs
     return value.image.name_full, value.output.socket.name, outputs["Alpha"].is_linked

@@ -63,16 +63,19 @@ class ImageValue:
         Empty: the active one.
     matrix
         Affine map of texture coordinates, of nodes of the type Mapping.
+    node
+        The image texture; `output` is one of its own, or one channel of its colours.
     """
 
     output: Output
     uv_map: str
     matrix: Matrix3
+    node: Any
 
     @property
     def image(self) -> Any:
         """Image of the node."""
-        return self.output.node.image
+        return self.node.image
 
 
 @dataclass(frozen=True)
@@ -92,8 +95,10 @@ class Procedural:
     ----------
     output
     uv_map : str or None
-        It depends on nothing but this UV map (empty: the active one), with a period of 1: one texture serves
-        all objects. None: it depends on more.
+        It depends on nothing but this UV map (empty: the active one): one texture serves all objects. None:
+        it depends on more.
+    matrix
+        Affine map of the UV map's coordinates, to those of a period of 1.
     is_of_view : bool
         It depends on the direction of view or the kind of ray, which a texture does not.
     is_number : bool
@@ -104,6 +109,7 @@ class Procedural:
 
     output: Output
     uv_map: str | None = None
+    matrix: Matrix3 = IDENTITY
     is_of_view: bool = False
     is_number: bool = False
     is_exact: bool = False
@@ -111,12 +117,16 @@ class Procedural:
 
 @dataclass(frozen=True, eq=False)
 class Texture:
-    """A baked value: a file on the mesh's baked or own texture coordinates, with the mean of its texels."""
+    """A baked value: a file on the mesh's baked or own texture coordinates, with the mean of its texels.
+
+    `matrix` maps the coordinates, before the file is looked up.
+    """
 
     file: str
     uv_map: str
     mean: tuple[float, float, float]
     raw: bool
+    matrix: Matrix3 = IDENTITY
 
 
 Value = Constant | ImageValue | AttributeValue | Procedural | Texture

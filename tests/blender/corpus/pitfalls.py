@@ -33,6 +33,8 @@ def pitfalls(folder):
     _named_by_default()
     _image_of_another_kind(folder)
     _alpha_and_colours_against_the_file(folder)
+    _tiled_and_corrected()
+    _packed_channels()
     light("AREA", "Panel", (0.0, 2.9, 2.0), 50.0, target=(0.0, 0.0, 2.0)).visible_camera = True
 
 
@@ -128,6 +130,27 @@ def _named_by_default():
     for name, colour in (("first", (0.7, 0.1, 0.1, 1.0)), ("second", (0.1, 0.7, 0.1, 1.0))):
         colours.new(name, "FLOAT_COLOR", "CORNER").data.foreach_set("color", 4 * colour)
     colours.render_color_index = 1
+
+
+def _tiled_and_corrected():
+    """An image that is turned and repeated by its Mapping, below a colour correction."""
+    tiled, tree, bsdf = shader("tiled", "BsdfDiffuse")
+    place = node_of(tree, "TexCoord").outputs["UV"]
+    mapped = node_of(tree, "Mapping", Vector=place, Scale=(8.0, 5.0, 1.0), Rotation=(0.0, 0.0, 0.5))
+    texture = picture(tree, image("repeated", lambda x, y: np.stack([x > 0.5, y > 0.5, 0.0 * x], -1), 64))
+    fill(tree, texture, {"Vector": mapped})
+    fill(tree, bsdf, {"Color": node_of(tree, "Invert", Color=texture)})
+    plane("Tiled", (-3.0, -2.0, 0.1), 0.5, tiled)
+
+
+def _packed_channels():
+    """Roughness and metal in two channels of one image."""
+    packed, tree, bsdf = shader("packed", "BsdfPrincipled")
+    layers = image("layers", lambda x, y: np.stack([0.0 * x, 0.3 + 0.6 * x, 1.0 * (y > 0.5)], -1), 16,
+                   space="Non-Color")  # fmt: skip
+    parts = node_of(tree, "SeparateColor", Color=layers)
+    fill(tree, bsdf, {"Roughness": parts.outputs[1], "Metallic": parts.outputs[2]})
+    plane("Packed", (-3.0, -3.0, 0.1), 0.5, packed)
 
 
 def _image_of_another_kind(folder):
