@@ -48,6 +48,7 @@ class _Part:
     mesh: Mesh
     material: Any
     placed: Placed
+    slot: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +87,8 @@ class Shapes:
         self.identifiers, self._files = Identifiers(), Identifiers()
         self._eyes = np.array([view.pose[:3, 3] for view in views]).reshape(-1, 3)
         self._middles, self._owners = np.zeros((0, 3)), np.zeros(0, np.int64)
+        self._twins: dict[int, list[Placed]] = {}  # objects by the id of their mesh
+        self._shared: dict[Any, tuple[_Material, Mesh]] = {}  # by mesh, slot and material
         self._bakery = Bakery(job, selection, views, self.textures, notes)
         self._shaders: dict[Any, Shader] = {}
         self._surfaces: dict[Any, tuple[str, Surface]] = {}
@@ -106,6 +109,8 @@ class Shapes:
         placed = [one for item in self._linked(placed, total) for one in self._apart(item)]
         self._middles = np.concatenate([np.zeros((0, 3)), *map(_middles, placed)])
         self._owners = np.repeat([id(item) for item in placed], [len(item.matrices) for item in placed])
+        for item in placed:
+            self._twins.setdefault(id(item.mesh), []).append(item)
         for number, item in enumerate(placed):
             if number % 50 == 0:
                 report_progress(0.3 + 0.6 * number / len(placed), "materials")
@@ -152,11 +157,9 @@ class Shapes:
                 if len(parts) == 1
                 else f"{part.name}: {part.material.name if part.material else 'none'}"
             )
-            shader, mesh, is_own = self._bakery.resolve(
-                self._shader(part.material), part.material, part.mesh, placed
-            )
-            is_back_seen = _has_relief(shader) and self._shows_its_back(part.mesh, placed)
-            material = _Material(shader, part, is_own, *_maps(shader, mesh), is_back_seen)
+            material, mesh = self._resolved(part)
+            is_back_seen = _has_relief(material.shader) and self._shows_its_back(part.mesh, placed)
+            material = replace(material, is_back_seen=is_back_seen)
             surface = self._surface(material)[1]
             if surface.is_invisible and not surface.emitted:
                 continue
@@ -175,6 +178,20 @@ class Shapes:
             ):
                 elements += self._shapes_of(f"{name} back", _back(mesh), material, radiance)
         return elements + (self._instances(placed, instanced) if instanced else [])
+
+    def _resolved(self, part: _Part) -> tuple[_Material, Mesh]:
+        """A part's shader without procedural values, and its mesh; linked duplicates share what is baked."""
+        placed, shader = part.placed, self._shader(part.material)
+        twins = [placed] if is_of_object(shader) else self._twins[id(placed.mesh)]
+        key = id(placed.mesh), part.slot, part.material
+        if len(twins) > 1 and key in self._shared:
+            return self._shared[key]
+        copies = [matrix for twin in twins for matrix in twin.matrices]
+        shader, mesh, is_own = self._bakery.resolve(shader, part.material, part.mesh, placed, copies)
+        resolved = _Material(shader, part, is_own, *_maps(shader, mesh)), mesh
+        if len(twins) > 1:
+            self._shared[key] = resolved
+        return resolved
 
     def _hides_its_back(self, mesh: Mesh, placed: Placed) -> bool:
         """Whether an emitter is closed, faces outward, and has neither a camera nor an object inside."""
@@ -236,7 +253,7 @@ class Shapes:
             shape.append(plugin("emitter", "area", radiance=radiance))
         elif radiance is not None:
             what, effect = "the emission of a surface without area is left out", "it gives no light"
-            self._notes.add("not-carried", material.part.name, "Emission", what, effect)
+            self._notes.add("not-carried", name, "Emission", what, effect)
         return named(shape, self.identifiers.unique(name))
 
     def _shader(self, material: Any) -> Shader:
@@ -292,7 +309,7 @@ def _parts(placed: Placed) -> Any:
     slots = np.clip(placed.mesh.materials, 0, last)
     for slot in np.unique(slots):
         mesh = placed.mesh if (slots == slot).all() else placed.mesh.select(slots == slot)
-        yield _Part(placed.name, mesh, placed.slots[slot] if placed.slots else None, placed)
+        yield _Part(placed.name, mesh, placed.slots[slot] if placed.slots else None, placed, slot)
 
 
 def _has_relief(shader: Shader) -> bool:

@@ -9,7 +9,7 @@ pytestmark = [pytest.mark.blender, pytest.mark.slow]
 
 @pytest.fixture(scope="module")
 def exported(blender):
-    code, out, result = blender.job(blender.make("pitfalls")[0], "pitfalls")
+    code, out, result = blender.job(blender.make("pitfalls")[0], "pitfalls", bake_px=128)
     assert code == 0, result
     return out, result
 
@@ -61,6 +61,12 @@ def test_a_tiled_image_below_a_correction_is_baked_over_its_own_square(scene):
     x, y = np.cos(angle) * u - np.sin(angle) * v, np.sin(angle) * u + np.cos(angle) * v
     wanted = np.stack([x % 1.0 <= 0.5, y % 1.0 <= 0.5, np.ones_like(x)], axis=1)
     assert (np.abs(found - wanted).max(axis=1) < 0.02).mean() > 0.9  # the rest are edges
+
+
+def test_linked_duplicates_are_baked_once_as_large_as_the_nearest(exported, shapes):
+    assert shapes["Far"].bsdf().id() == shapes["Near"].bsdf().id()
+    (file,) = (exported[0] / "textures").glob("wood*")
+    assert np.array(mi.Bitmap(str(file))).shape[:2] == (128, 128)
 
 
 def test_a_channel_of_an_image_is_not_baked(exported, shapes):

@@ -71,8 +71,13 @@ class Bakery:
         self._of_uv: dict[Any, Value] = {}
         self._scene: BakeScene | None = None
 
-    def resolve(self, shader: Shader, material: Any, mesh: Mesh, placed: Placed) -> tuple[Shader, Mesh, bool]:
-        """A shader without procedural values, its mesh, and whether it is this object's own."""
+    def resolve(
+        self, shader: Shader, material: Any, mesh: Mesh, placed: Placed, copies: list[np.ndarray]
+    ) -> tuple[Shader, Mesh, bool]:
+        """A shader without procedural values, its mesh, and whether it is the mesh's own.
+
+        `copies` are the matrices of all objects that share the result.
+        """
         read = {v.name or mesh.active_colour for v in values_of(shader) if isinstance(v, AttributeValue)}
         shader = replaced(shader, lambda value: _of_mesh(value, mesh, has_several=len(read) > 1))
         self._note_lost(shader, material, mesh, placed)
@@ -83,7 +88,7 @@ class Bakery:
             return shader, mesh, False
         if len(uv_maps) <= 1 and all(isinstance(v, Procedural) and v.uv_map is not None for v in wanted):
             return replaced(shader, lambda value: self._over_uv(value, material)), mesh, False
-        size = self._resolution(placed, mesh)
+        size = self._resolution(copies, mesh)
         shader = self._with_baked_normals(shader)
         mesh = _with_room(mesh, shader)
         with self._stage().mesh(mesh, placed) as canvas:
@@ -189,11 +194,11 @@ class Bakery:
         effect = "the surface looks the same from all directions"
         self._notes.add("approximated", name, output.node.name, "it depends on the view", effect)
 
-    def _resolution(self, placed: Placed, mesh: Mesh) -> int:
-        """A power of two, by the object's largest size in the views of the path."""
+    def _resolution(self, copies: list[np.ndarray], mesh: Mesh) -> int:
+        """A power of two, by the largest size of a mesh's copies in the views of the path."""
         local = np.concatenate([mesh.positions.min(axis=0), mesh.positions.max(axis=0)]).reshape(2, 3)
         nearest = 0.0
-        for matrix in placed.matrices[:64]:
+        for matrix in copies[:: max(len(copies) // 64, 1)]:
             low, high = (matrix[:3, :3] @ point + matrix[:3, 3] for point in local)
             centre, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
             for view in self._views[:: max(len(self._views) // 64, 1)]:

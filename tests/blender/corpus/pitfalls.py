@@ -35,6 +35,7 @@ def pitfalls(folder):
     _alpha_and_colours_against_the_file(folder)
     _tiled_and_corrected()
     _packed_channels()
+    _duplicates_of_procedurals()
     light("AREA", "Panel", (0.0, 2.9, 2.0), 50.0, target=(0.0, 0.0, 2.0)).visible_camera = True
 
 
@@ -151,6 +152,15 @@ def _packed_channels():
     parts = node_of(tree, "SeparateColor", Color=layers)
     fill(tree, bsdf, {"Roughness": parts.outputs[1], "Metallic": parts.outputs[2]})
     plane("Packed", (-3.0, -3.0, 0.1), 0.5, packed)
+
+
+def _duplicates_of_procedurals():
+    """Two objects of one mesh, the second one much nearer to the camera."""
+    wood, tree, bsdf = shader("wood", "BsdfDiffuse")
+    place = node_of(tree, "TexCoord").outputs["Object"]
+    fill(tree, bsdf, {"Color": node_of(tree, "TexNoise", Vector=place, Scale=9.0).outputs["Color"]})
+    far = plane("Far", (0.0, 60.0, 0.1), 0.2, wood)
+    add("Near", far.data, (0.3, -4.9, 1.9))
 
 
 def _image_of_another_kind(folder):
