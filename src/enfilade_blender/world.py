@@ -14,9 +14,10 @@ from enfilade_blender.image_files import F32, write_exr
 from enfilade_blender.lights import Sun
 from enfilade_blender.materials.graph import Graph
 from enfilade_blender.materials.image_pixels import linear_pixels
-from enfilade_blender.materials.stand_ins import put_stand_ins
+from enfilade_blender.materials.stand_ins import IMAGES, put_stand_ins
 from enfilade_blender.materials.table import VIEW_SOCKETS
 from enfilade_blender.materials.values import Constant, Emission, Nothing
+from enfilade_blender.motion import trees
 from enfilade_blender.notes import Notes
 from enfilade_blender.records import Selection
 from enfilade_blender.scene_xml import Element, plugin
@@ -114,9 +115,10 @@ def _positive(radiance: np.ndarray, world: Any, notes: Notes) -> np.ndarray:
 
 def _rendered(world: Any, width: int, folder: Path, frame: int, notes: Notes) -> F32:
     """Radiance of a world at a frame, from north at the left edge over east, zenith on top."""
-    images = [node.image for node in world.node_tree.nodes if node.type == "TEX_ENVIRONMENT" and node.image]
+    nodes = [node for tree in trees(world.node_tree) for node in tree.nodes]
+    images = [node.image for node in nodes if node.type in IMAGES and node.image]
     width = min(max([width, *(image.size[0] for image in images)]), WIDTH_MAX)
-    has_sky = any(node.type == "TEX_SKY" for node in world.node_tree.nodes)
+    has_sky = any(node.type == "TEX_SKY" for node in nodes)
     width = max(width, WIDTH_SUN) if has_sky else width
     scene = bpy.data.scenes.new("enfilade world")
     scene.world = _for_light(world, notes)

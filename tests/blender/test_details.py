@@ -65,6 +65,7 @@ def test_a_normal_map_turns_with_its_uv_map(exported, shapes):
 
 def test_a_world_that_the_camera_does_not_see_still_lights(exported):
     image = np.array(mi.Bitmap(str(exported[0] / "textures" / "environment.exr")))
+    assert image.shape[1] == 1100  # of an image in a group
     assert image.mean(axis=(0, 1)) == pytest.approx([0.2, 0.2, 0.2], rel=0.01)
 
 

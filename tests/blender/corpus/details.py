@@ -62,7 +62,10 @@ def _hidden_world():
     group = bpy.data.node_groups.new("by ray", "ShaderNodeTree")
     group.interface.new_socket("Color", in_out="OUTPUT", socket_type="NodeSocketColor")
     ray, end = node_of(group, "LightPath"), group.nodes.new("NodeGroupOutput")
-    mix = node_of(group, "MixRGB", Color1=(0.2, 0.2, 0.2, 1.0), Color2=(0.0, 1.0, 0.0, 1.0))
+    dusk = bpy.data.images.new("dusk", 1100, 1, float_buffer=True)
+    dusk.pixels = 1100 * [0.2, 0.2, 0.2, 1.0]
+    dusk.pack()
+    mix = node_of(group, "MixRGB", Color1=dusk, Color2=(0.0, 1.0, 0.0, 1.0))
     fill(group, mix, {"Fac": ray.outputs["Is Camera Ray"]})
     fill(group, end, {0: mix})
     node = node_of(value.node_tree, "Group")
