@@ -18,7 +18,7 @@ from enfilade_blender.job import Limits
 from enfilade_blender.mesh_data import AttributeNames, read_mesh
 from enfilade_blender.notes import Notes
 from enfilade_blender.ply import Mesh
-from enfilade_blender.records import Evaluated, Lamp, Placed, Selection
+from enfilade_blender.records import Evaluated, Lamp, Placed, Selection, rendered_particles
 
 ENGINE = "ENFILADE_EXPORT"
 NOT_CARRIED = {
@@ -238,8 +238,7 @@ def _note_object(instance: Any, notes: Notes) -> None:
 
 
 def _note_hair(obj: Any, notes: Notes) -> None:
-    shown = [m for m in getattr(obj, "modifiers", ()) if m.type == "PARTICLE_SYSTEM" and m.show_render]
-    for system in (modifier.particle_system for modifier in shown):
+    for system in rendered_particles(obj):
         if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
             what = "hair can't be exported"
             notes.add(

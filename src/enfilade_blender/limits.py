@@ -10,7 +10,7 @@ from typing import Any
 
 from enfilade_blender.failure import ExportError
 from enfilade_blender.job import Limits
-from enfilade_blender.records import Selection
+from enfilade_blender.records import Selection, rendered_particles
 
 MAX_LEVELS = 12  # of subdivision: a cube has 2e8 triangles
 
@@ -23,14 +23,15 @@ def check_size(selection: Selection, limits: Limits) -> None:
     ExportError
     """
     counts: dict[str, int] = {}
-    total = _instances(selection.scene.collection, counts, ())
+    objects = selection.objects()
+    total = sum(_of_object(obj, counts, ()) for obj in objects)
     if total > limits.instances:
-        most = max(selection.scene.objects, key=lambda obj: _of_object(obj, counts, ()))
+        most = max(objects, key=lambda obj: _of_object(obj, counts, ()))
         raise ExportError(
             f"the scene has {total} instances, more than {limits.instances}", most.name,
             "reduce its copies, or raise the limit",
         )  # fmt: skip
-    for obj in selection.scene.objects:
+    for obj in objects:
         triangles = estimated_triangles(obj, selection.scene.render)
         if triangles > limits.triangles:
             raise ExportError(
@@ -56,7 +57,7 @@ def estimated_triangles(obj: Any, render: Any) -> int:
 
 
 def _instances(collection: Any, counts: dict[str, int], inside: tuple[str, ...]) -> int:
-    """Objects that a collection becomes, instances included; a cycle counts once."""
+    """Objects that an instanced collection becomes, instances included; a cycle counts once."""
     name = collection.name_full
     if name in inside:
         return 0
@@ -66,13 +67,15 @@ def _instances(collection: Any, counts: dict[str, int], inside: tuple[str, ...])
 
 
 def _of_object(obj: Any, counts: dict[str, int], inside: tuple[str, ...]) -> int:
+    if obj.hide_render:
+        return 0
     total = 1
     if obj.instance_type == "COLLECTION" and obj.instance_collection is not None:
         total += _instances(obj.instance_collection, counts, inside)
     if obj.instance_type in ("VERTS", "FACES") and obj.type == "MESH":
         points = obj.data.vertices if obj.instance_type == "VERTS" else obj.data.polygons
         total += len(points) * len(obj.children)
-    for system in obj.particle_systems:
+    for system in rendered_particles(obj):
         settings = system.settings
         if settings.render_type in ("OBJECT", "COLLECTION"):
             copies = settings.count * (

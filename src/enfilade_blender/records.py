@@ -46,6 +46,12 @@ def _shown(layer: Any, *, is_hidden: bool = False) -> list[Any]:
     return [*own, *(obj for child in layer.children for obj in _shown(child, is_hidden=is_hidden))]
 
 
+def rendered_particles(obj: Any) -> list[Any]:
+    """Particle systems of an object that renders show."""
+    shown = [m for m in getattr(obj, "modifiers", ()) if m.type == "PARTICLE_SYSTEM" and m.show_render]
+    return [modifier.particle_system for modifier in shown]
+
+
 @dataclass(frozen=True, eq=False)
 class View:
     """A camera at a frame.

@@ -556,7 +556,7 @@ def _changed_by_others(scene):
 
 
 def simplified(_folder):
-    """A subdivision that Simplify lowers, below an image on normalized coordinates."""
+    """A subdivision that Simplify lowers, below an image on normalized coordinates; more that is not seen."""
     scene = new_file()
     scene.render.use_simplify, scene.render.simplify_subdivision_render = True, 1
     material = principled("normalized", image("tiles", tiles, 16))
@@ -566,6 +566,18 @@ def simplified(_folder):
     fill(tree, tree.nodes["Image Texture"], {"Vector": mapped})
     level = plane("Soft", (0.0, 0.0, 0.0), 4.0, material).modifiers.new("Subdivision", "SUBSURF")
     level.render_levels = 10
+    plain = principled("plain")
+    unseen = [plane(name, (0.0, 0.0, 0.0), 1.0, plain) for name in ("Excluded", "Unseen", "Bare")]
+    for obj in unseen[:2]:
+        obj.modifiers.new("Array", "ARRAY").count = 3_000_000
+        obj.modifiers["Array"].show_viewport = False
+        scene.collection.children.link(group(obj.name, [obj]))
+    scene.view_layers[0].layer_collection.children["Excluded"].exclude = True
+    bpy.data.collections["Unseen"].hide_render = True
+    particles = unseen[2].modifiers.new("Particles", "PARTICLE_SYSTEM")
+    particles.show_render = particles.show_viewport = False
+    settings = particles.particle_system.settings
+    settings.count, settings.render_type, settings.instance_object = 2_000_000, "OBJECT", unseen[0]
 
 
 def leaves(folder):
