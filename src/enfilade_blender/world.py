@@ -13,7 +13,7 @@ import numpy as np
 from enfilade_blender.image_files import F32, write_exr
 from enfilade_blender.lights import Sun
 from enfilade_blender.materials.graph import Graph
-from enfilade_blender.materials.image_pixels import linear_pixels
+from enfilade_blender.materials.image_pixels import fault, linear_pixels
 from enfilade_blender.materials.stand_ins import IMAGES, put_stand_ins
 from enfilade_blender.materials.table import VIEW_SOCKETS
 from enfilade_blender.materials.values import Constant, Emission, Nothing
@@ -162,7 +162,7 @@ def _for_light(world: Any, notes: Notes) -> Any:
             notes.add("approximated", world.name, node.name, what, effect)
     for node in put_stand_ins(copy.node_tree):
         name = node.image.name if node.image is not None else "none"
-        what, effect = f"the image {name} is missing", "a mid grey is in its place"
+        what, effect = f"the image {name} {fault(node.image)}", "a mid grey is in its place"
         notes.add("approximated", world.name, node.name, what, effect)
     return copy
 

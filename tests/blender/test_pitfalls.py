@@ -1,5 +1,7 @@
 """Data that has other values than a first look at it tells (see corpus/pitfalls.py)."""
 
+from xml.etree import ElementTree as ET
+
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -67,6 +69,22 @@ def test_linked_duplicates_are_baked_once_as_large_as_the_nearest(exported, shap
     assert shapes["Far"].bsdf().id() == shapes["Near"].bsdf().id()
     (file,) = (exported[0] / "textures").glob("wood*")
     assert np.array(mi.Bitmap(str(file))).shape[:2] == (128, 128)
+
+
+def test_what_has_no_effect_is_neither_baked_nor_noted(exported, shapes):
+    assert not [note for note in exported[1]["notes"] if note["object"].startswith("idle")]
+    assert values(shapes["Idle"].bsdf(), "diffuse_reflectance.value")[0] < 0.2  # not that of the muted red
+
+
+def test_dim_emission_is_stored_as_srgb(exported):
+    shape = ET.parse(exported[0] / "scene.xml").find("shape[@id='Dim']")
+    assert shape.find("emitter/texture/boolean[@name='raw']").get("value") == "false"
+
+
+def test_coordinates_and_layers_that_are_lost_are_noted(exported):
+    found = {note["object"]: note["what"] for note in exported[1]["notes"] if note["kind"] == "approximated"}
+    assert found["instanced"] == "its coordinates of the instancer are taken as 0"
+    assert found["layers.exr"].endswith("has several layers, none of which is read")
 
 
 def test_a_channel_of_an_image_is_not_baked(exported, shapes):

@@ -17,7 +17,7 @@ from enfilade_blender.image_files import F32
 from enfilade_blender.job import Job
 from enfilade_blender.materials.bake_scene import BakeKind, BakeScene
 from enfilade_blender.materials.graph import depends_on_place, is_of_view, upstream
-from enfilade_blender.materials.image_pixels import is_missing
+from enfilade_blender.materials.image_pixels import fault, is_missing
 from enfilade_blender.materials.stand_ins import IMAGES
 from enfilade_blender.materials.table import OBJECT_DATA, OBJECT_EFFECT
 from enfilade_blender.materials.textures import Textures
@@ -239,7 +239,9 @@ def _lost(found: Output, mesh: Mesh, placed: Placed) -> str:
     if _is_missing(node):
         is_sequence = node.image is not None and node.image.source == "SEQUENCE"
         what = "the first frame of its image sequence" if is_sequence else "its image"
-        return f"{what} is missing, and is taken as a mid grey"
+        return f"{what} {fault(node.image)}, and is taken as a mid grey"
+    if getattr(node, "from_instancer", False):
+        return "its coordinates of the instancer are taken as 0"
     if node.type == "OBJECT_INFO" and name == "Random":
         return "its Random is another number than in Cycles, the same for all copies"
     if node.type == "NEW_GEOMETRY" and name == "Random Per Island":

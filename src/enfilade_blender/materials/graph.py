@@ -12,6 +12,7 @@ from enfilade_blender.materials import mapping, table
 from enfilade_blender.materials.values import (
     IDENTITY,
     PRINCIPLED,
+    WITHOUT_EFFECT,
     Add,
     AttributeValue,
     Bump,
@@ -36,6 +37,7 @@ from enfilade_blender.notes import Notes
 
 PLAIN_SPACES = ("sRGB", "Non-Color", "Linear Rec.709", "Raw", "Linear")
 PLAIN_SOURCES = ("FILE", "GENERATED")
+ZERO = Constant((0.0,))
 DIELECTRIC_IOR = 1.45
 
 
@@ -74,26 +76,41 @@ class Graph:
             return Nothing()
         node, inner = found.node, found.groups
         if node.type == "BSDF_PRINCIPLED":
-            names = (name for name in PRINCIPLED if name in node.inputs)
-            inputs = {name: self.value(node.inputs[name], inner) for name in names}
-            if inputs["Emission Strength"] != Constant((0.0,)):
-                inputs["Emission Color"] = _baked(inputs["Emission Color"])
-            self._note_coat_normal(node, inner)
-            return Principled(inputs, self.normal(node.inputs["Normal"], inner), node.name)
+            return self._principled(node, inner)
         if node.type == "MIX_SHADER":
-            first, second = (self.shader(node.inputs[i], inner) for i in (1, 2))
-            if (seen := self._seen_side(node, first, second, inner)) is not None:
-                return seen
-            ior = self._fresnel(node.inputs[0], inner)
-            if ior is not None and isinstance(second, Lobe) and second.kind == "glossy":
-                return Mix(Constant((0.5,)), first, second, ior, node.name)
-            return Mix(self.value(node.inputs[0], inner), first, second, None, node.name)
+            return self._mix(node, inner)
         if node.type == "ADD_SHADER":
             return Add(self.shader(node.inputs[0], inner), self.shader(node.inputs[1], inner), node.name)
         if node.type in ("EMISSION", "BACKGROUND"):
-            colour, strength = (self.value(node.inputs[name], inner) for name in ("Color", "Strength"))
-            return Emission(_baked(colour), strength)
+            strength = self.value(node.inputs["Strength"], inner)
+            is_dark = strength == ZERO
+            return Emission(
+                strength if is_dark else _baked(self.value(node.inputs["Color"], inner)), strength
+            )
         return self._lobe(node, inner)
+
+    def _principled(self, node: Any, groups: tuple[Any, ...]) -> Shader:
+        names = [name for name in PRINCIPLED if name in node.inputs]
+        for weight, dependent in WITHOUT_EFFECT.items():
+            if self.value(node.inputs[weight], groups) == ZERO:
+                names = [name for name in names if name not in dependent]
+        inputs = {name: self.value(node.inputs[name], groups) for name in names}
+        if "Emission Color" in inputs:
+            inputs["Emission Color"] = _baked(inputs["Emission Color"])
+        self._note_coat_normal(node, groups)
+        return Principled(inputs, self.normal(node.inputs["Normal"], groups), node.name)
+
+    def _mix(self, node: Any, groups: tuple[Any, ...]) -> Shader:
+        factor = follow(node.inputs[0], groups)
+        if not isinstance(factor, Output) and factor.default_value in (0.0, 1.0):
+            return self.shader(node.inputs[1 + int(factor.default_value)], groups)
+        first, second = (self.shader(node.inputs[i], groups) for i in (1, 2))
+        if (seen := self._seen_side(node, first, second, groups)) is not None:
+            return seen
+        ior = self._fresnel(node.inputs[0], groups)
+        if ior is not None and isinstance(second, Lobe) and second.kind == "glossy":
+            return Mix(Constant((0.5,)), first, second, ior, node.name)
+        return Mix(self.value(node.inputs[0], groups), first, second, None, node.name)
 
     def value(self, socket: Any, groups: tuple[Any, ...]) -> Value:
         """Value of an input."""
@@ -250,7 +267,7 @@ def follow(socket: Any, groups: tuple[Any, ...]) -> Any:
         elif node.mute:
             inner = [link.from_socket for link in node.internal_links if link.to_socket == source]
             if not inner:
-                return source
+                return socket
             socket = inner[0]
         elif node.type == "GROUP" and node.node_tree is not None:
             ends = [n for n in node.node_tree.nodes if n.type == "GROUP_OUTPUT"]

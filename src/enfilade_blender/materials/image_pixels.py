@@ -34,6 +34,12 @@ def is_missing(image: Any, user: Any = None) -> bool:
     return image is None or not (image.has_data or (image.size[0] > 0 and len(image.pixels) > 0))  # loads it
 
 
+def fault(image: Any) -> str:
+    """Why an image has no pixels."""
+    is_layered = image is not None and image.type == "MULTILAYER"
+    return "has several layers, none of which is read" if is_layered else "is missing"
+
+
 def _number(user: Any, frame: int) -> int:
     """Number of the file that an image user shows of a sequence, as Blender finds it."""
     place = frame - user.frame_start + 1

@@ -96,7 +96,8 @@ class Surface:
         if abs(radiance.strength - 1.0) < 1e-3:
             return context.textures.colour(radiance.colour)
         scaled = context.textures.pixels(radiance.colour) * radiance.strength
-        return context.textures.rewritten(radiance.colour, scaled, f"emission {radiance.strength:.3g}")
+        name = f"emission {radiance.strength:.3g}"
+        return context.textures.rewritten(radiance.colour, scaled, name, raw=False)
 
 
 def _other(bsdf: Element, than: Element) -> Element | None:

@@ -11,6 +11,7 @@ import numpy as np
 from enfilade_blender.image_files import F32, srgb_from_linear, write_exr, write_png
 from enfilade_blender.materials.image_pixels import (
     RAW_SPACES,
+    fault,
     image_colours,
     is_as_stored,
     is_missing,
@@ -166,7 +167,7 @@ class Textures:
             return False
         name = image.name if image is not None else "none"
         file = image.filepath if image is not None else ""
-        what = f"the image {name} ({file}) is missing" if image is not None else "there is no image"
+        what = f"the image {name} ({file}) {fault(image)}" if image is not None else "there is no image"
         self._notes.add("approximated", name, value.output.node.name, what, "a mid grey is in its place")
         return True
 

@@ -9,6 +9,12 @@ from typing import Any
 
 Matrix3 = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 IDENTITY: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+WITHOUT_EFFECT = {  # inputs of the Principled BSDF that a weight of 0 leaves without effect
+    "Emission Strength": ("Emission Color",),
+    "Coat Weight": ("Coat Roughness", "Coat IOR", "Coat Tint"),
+    "Sheen Weight": ("Sheen Tint",),
+    "Anisotropic": ("Anisotropic Rotation",),
+}
 LUMINANCE = (0.2126729, 0.7151522, 0.0721749)  # of linear Rec.709, in Cycles
 PRINCIPLED = {  # inputs that are read, of which Blender 4.2 has not all; and numbers in place of a texture
     "Base Color": 0.8, "Metallic": 0.0, "Roughness": 0.5, "IOR": 1.45, "Alpha": 1.0, "Diffuse Roughness": 0.0,

@@ -36,6 +36,8 @@ def pitfalls(folder):
     _tiled_and_corrected()
     _packed_channels()
     _duplicates_of_procedurals()
+    _without_effect()
+    _lost_in_files(folder)
     light("AREA", "Panel", (0.0, 2.9, 2.0), 50.0, target=(0.0, 0.0, 2.0)).visible_camera = True
 
 
@@ -161,6 +163,44 @@ def _duplicates_of_procedurals():
     fill(tree, bsdf, {"Color": node_of(tree, "TexNoise", Vector=place, Scale=9.0).outputs["Color"]})
     far = plane("Far", (0.0, 60.0, 0.1), 0.2, wood)
     add("Near", far.data, (0.3, -4.9, 1.9))
+
+
+def _without_effect():
+    """Patterns below weights of 0, and a colour of a muted node; a dim screen."""
+    idle, tree, bsdf = shader("idle", "BsdfPrincipled", Emission_Strength=0.0, Coat_Weight=0.0)
+    mix, glow = node_of(tree, "MixShader", Fac=0.0), node_of(tree, "Emission", Strength=0.0)
+    both = node_of(tree, "AddShader")
+    colour = node_of(tree, "RGB")
+    colour.outputs[0].default_value, colour.mute = (1.0, 0.0, 0.0, 1.0), True
+    bsdf.inputs["Base Color"].default_value = 0.1, 0.6, 0.2, 1.0
+    noise = node_of(tree, "TexNoise").outputs["Color"]
+    fill(tree, bsdf, {"Base Color": colour, "Emission Color": noise, "Coat Roughness": noise})
+    fill(tree, glow, {"Color": noise})
+    fill(tree, both, {0: bsdf, 1: glow})
+    fill(tree, mix, {1: both, 2: node_of(tree, "BsdfDiffuse", Color=noise)})
+    fill(tree, tree.nodes["Material Output"], {"Surface": mix})
+    plane("Idle", (-2.0, -3.0, 0.1), 0.5, idle)
+    ramp = image("ramp", lambda x, _: np.repeat(x[..., None], 3, -1), 16)
+    plane("Dim", (-1.0, -3.0, 0.1), 0.5, shader("dim", "Emission", Color=ramp, Strength=0.5)[0])
+
+
+def _lost_in_files(folder):
+    """Coordinates of an instancer, and a file of several layers."""
+    instanced, tree, bsdf = shader("instanced", "BsdfDiffuse")
+    place = node_of(tree, "TexCoord")
+    place.from_instancer = True
+    fill(tree, bsdf, {"Color": place.outputs["Generated"]})
+    plane("Instanced", (0.0, -3.0, 0.1), 0.5, instanced)
+    render = bpy.data.scenes.new("layers").render
+    render.engine, render.resolution_x, render.resolution_y = "CYCLES", 4, 4
+    bpy.data.scenes["layers"].camera = bpy.context.scene.camera
+    bpy.data.scenes["layers"].cycles.samples = 1
+    render.image_settings.file_format = "OPEN_EXR_MULTILAYER"
+    render.filepath = str(folder / "layers.exr")
+    bpy.ops.render.render(write_still=True, scene="layers")
+    bpy.data.scenes.remove(bpy.data.scenes["layers"])
+    layered = bpy.data.images.load(str(folder / "layers.exr"))
+    plane("Layered", (1.0, -3.0, 0.1), 0.5, shader("layered", "BsdfDiffuse", Color=layered)[0])
 
 
 def _image_of_another_kind(folder):
