@@ -20,6 +20,7 @@ FAST_GI_EFFECTS = {
     "REPLACE": "indirect light is computed, not approximated: it may be brighter or darker",
     "ADD": "indirect light is darker: the approximation adds light of the world",
 }
+LINEAR = "Linear Rec.709"
 SOFT_FALLOFF = 0.1  # least error of the irradiance of the nearest surface that is noted
 LEAST_CLAMP = 10.0  # Cycles' own limit of indirect light; a lower one makes pictures darker
 
@@ -28,8 +29,11 @@ def note_settings(job: Job, selection: Selection, notes: Notes) -> None:
     """Note settings of the scene's view, frames, view layers and of what follows the render."""
     scene = selection.scene
     view, render = scene.view_settings, scene.render
+    space = getattr(getattr(bpy.data, "colorspace", None), "working_space", LINEAR)  # from Blender 5.0 on
     tones, picture = "the tones of the picture differ", "the picture is as Cycles alone renders it"
     settings = {
+        ("Working Space", f"its working space {space}", "colours are taken as Linear Rec.709"): space
+        != LINEAR,
         ("Color Management: Gamma", "gamma of the view", tones): abs(view.gamma - 1.0) > 1e-4,
         ("Color Management: Curves", "curves of the view", tones): view.use_curve_mapping,
         ("Color Management: White balance", "white balance of the view", tones): getattr(
@@ -47,6 +51,9 @@ def note_settings(job: Job, selection: Selection, notes: Notes) -> None:
     for (name, what, effect), is_used in settings.items():
         if is_used:
             notes.add("not-carried", scene.name, name, f"{what} is left out", effect)
+    if render.engine != "CYCLES" and job.source.suffix.lower() == ".blend":
+        what = f"the scene is read as Cycles has it, not {render.engine.removeprefix('BLENDER_')}"
+        notes.add("approximated", scene.name, "Render Engine", what, "the picture is that of a path tracer")
     (first, last), (start, end) = selection.frames, (scene.frame_start, scene.frame_end)
     if first < start or last > end:
         what = f"frames {first}-{last} reach beyond the range of the scene, {start}-{end}"

@@ -71,6 +71,26 @@ for note, items in ((note_depths, views), (note_falloff, lamps)):
     print(scene.count)
 """
 
+WORKING_SPACES = """
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+sys.path.insert(0, sys.argv[1])
+import bpy
+from enfilade_blender import left_out
+from enfilade_blender.job import Job
+from enfilade_blender.notes import Notes
+from enfilade_blender.records import Selection
+
+scene = bpy.context.scene
+selection = Selection(scene, scene.view_layers[0], (1, 1), (8, 8))
+for space in ("Linear Rec.709", "ACEScg"):
+    left_out.bpy = SimpleNamespace(data=SimpleNamespace(colorspace=SimpleNamespace(working_space=space)))
+    notes = Notes()
+    left_out.note_settings(Job("export", Path("a.blend"), Path("b")), selection, notes)
+    print([note["what"] for note in notes.to_list() if note["node"] == "Working Space"])
+"""
+
 
 @pytest.fixture(scope="session")
 def files(blender):
@@ -279,6 +299,12 @@ def test_notes_cast_fewer_rays_at_more_objects(blender):
     assert counts == {100: [50 * 40, 20 * 27], 20_000: [5 * 8, 5 * 7], 1_000_000: [8, 7]}
 
 
+def test_other_working_spaces_of_blender_5_are_noted(blender):
+    done = blender.run("-c", WORKING_SPACES, Path(enfilade_blender.__file__).parents[1])
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert done.stdout.splitlines()[-2:] == ["[]", "['its working space ACEScg is left out']"]
+
+
 def test_constants_of_a_lamps_nodes_are_kept(exported):
     out, result = exported("lamp_nodes")
     emitters = ET.parse(out / "scene.xml").getroot().findall("emitter[@type='point']")
@@ -325,6 +351,7 @@ def test_settings_that_are_left_out_are_noted(exported):
         ("matcap, matcap", "it depends on the view"),
         ("islands", "its Random Per Island are other numbers than in Cycles"),
         ("stained", grey),
+        ("Scene", "the scene is read as Cycles has it, not WORKBENCH"),
     }
     assert ("broken", "a number that is NaN or infinite is taken as 0") in notes(result, "approximated")
 

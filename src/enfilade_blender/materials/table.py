@@ -250,6 +250,7 @@ OBJECTS = (
         "not carried",
         "left out",
     ),
+    ("Working spaces of Blender 5 but Linear Rec.709", "not carried", "colours are taken as Linear Rec.709"),
     ("File of a newer Blender than the one that reads it", "not carried", "what that one does not know"),
     ("Missing fonts and caches, drivers that need Python", "not carried", "as Blender shows them without"),
 )

@@ -387,6 +387,7 @@ def left_out(folder):
     fill(tree, emission, {"Strength": value})
     plane("Hole", (0.0, 4.0, 0.0), 1.0, hole)
     plane("Broken", (5.0, 4.0, 0.0), 1.0, principled("broken", (math.nan, 0.5, 0.5, 1.0)))
+    scene.render.engine = "BLENDER_WORKBENCH"
     scene.render.use_border = scene.render.use_multiview = scene.cycles.use_fast_gi = True
     scene.view_layers.new("Second")
     scene.view_layers[0].material_override = principled("clay")
