@@ -16,14 +16,13 @@ from enfilade_blender.materials.graph import Graph, is_of_object, is_of_place
 from enfilade_blender.materials.surfaces import Surface, build
 from enfilade_blender.materials.textures import Textures, file_stem
 from enfilade_blender.materials.values import (
-    Add,
     AttributeValue,
     Constant,
     ImageValue,
     Lobe,
-    Mix,
     Shader,
     Texture,
+    normals_of,
     values_of,
 )
 from enfilade_blender.notes import Notes, report_progress
@@ -158,7 +157,8 @@ class Shapes:
                 else f"{part.name}: {part.material.name if part.material else 'none'}"
             )
             material, mesh = self._resolved(part)
-            is_back_seen = _has_relief(material.shader) and self._shows_its_back(part.mesh, placed)
+            has_relief = any(normal is not None for normal in normals_of(material.shader))
+            is_back_seen = has_relief and self._shows_its_back(part.mesh, placed)
             material = replace(material, is_back_seen=is_back_seen)
             surface = self._surface(material)[1]
             if surface.is_invisible and not surface.emitted:
@@ -261,7 +261,7 @@ class Shapes:
             return DEFAULT
         if material.name_full not in self._shaders:
             if material.use_nodes and material.node_tree is not None:
-                shader = Graph(material.name, self._notes).surface(material.node_tree)
+                shader = Graph(material.name, self._notes).surface(material)
             else:
                 shader = replace(DEFAULT, colour=Constant(tuple(material.diffuse_color)[:3]))
             self._shaders[material.name_full] = shader
@@ -310,13 +310,6 @@ def _parts(placed: Placed) -> Any:
     for slot in np.unique(slots):
         mesh = placed.mesh if (slots == slot).all() else placed.mesh.select(slots == slot)
         yield _Part(placed.name, mesh, placed.slots[slot] if placed.slots else None, placed, slot)
-
-
-def _has_relief(shader: Shader) -> bool:
-    """Whether a shader has a normal or bump map."""
-    if isinstance(shader, Mix | Add):
-        return _has_relief(shader.first) or _has_relief(shader.second)
-    return getattr(shader, "normal", None) is not None
 
 
 def _middles(placed: Placed) -> np.ndarray:

@@ -299,6 +299,11 @@ def test_heights_and_normals_have_all_digits(blender):
     assert (values["below 0"].min(), values["below 0"].max()) == pytest.approx((-0.49, 0.49), abs=0.01)
     assert values["low"].max() == pytest.approx(0.004, abs=1e-4)
     assert np.diff(values["as it is"][32]) == pytest.approx(1.0 / 64.0, abs=1e-5)
+    scale = bsdfs["material bumps"].find(".//bsdf[@type='bumpmap']/float[@name='scale']").get("value")
+    assert float(scale) == pytest.approx(0.3)
+    noted = [(n["kind"], n["object"]) for n in result["notes"] if n["node"] == "Displacement"]
+    left_out = ("not-carried", "moved"), ("not-carried", "own bumps")
+    assert noted == [("approximated", "moved and bumps"), *left_out]
     # Baked beside noise, between the image's pixels.
     name = "beside noise: beside noise"
     assert len(np.unique(found(name, "bsdf[@type='bumpmap']/texture"))) > 64

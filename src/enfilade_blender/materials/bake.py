@@ -37,6 +37,7 @@ from enfilade_blender.materials.values import (
     Shader,
     Texture,
     Value,
+    normals_of,
     replaced,
     values_of,
 )
@@ -291,7 +292,4 @@ def _uv_maps(value: Any) -> list[str]:
 
 def _tangents(shader: Shader) -> list[str]:
     """UV maps along which normal maps are turned; in Mitsuba they are those of the images."""
-    if isinstance(shader, Mix | Add):
-        return _tangents(shader.first) + _tangents(shader.second)
-    normal = shader.normal if isinstance(shader, Principled | Lobe) else None
-    return [normal.output.node.uv_map] if isinstance(normal, NormalMap) else []
+    return [normal.output.node.uv_map for normal in normals_of(shader) if isinstance(normal, NormalMap)]

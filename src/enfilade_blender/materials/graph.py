@@ -31,6 +31,8 @@ from enfilade_blender.materials.values import (
     ProceduralNormal,
     Shader,
     Value,
+    bumped,
+    normals_of,
     values_of,
 )
 from enfilade_blender.notes import Notes
@@ -54,20 +56,40 @@ class Graph:
     def __init__(self, owner: str, notes: Notes) -> None:
         self._owner, self._notes = owner, notes
 
-    def surface(self, tree: Any) -> Shader:
-        """Shader of the output that Cycles takes."""
-        output = tree.get_output_node("CYCLES")
+    def surface(self, material: Any) -> Shader:
+        """Shader of a material's output that Cycles takes, with its displacement as bumps."""
+        output = material.node_tree.get_output_node("CYCLES")
         if output is None:
             return Nothing()
-        for name, effect in (
-            ("Volume", "the object is without it"),
-            ("Displacement", "the surface is smooth"),
-        ):
-            if output.inputs[name].is_linked:
-                self._notes.add("not-carried", self._owner, name, f"{name.lower()} is not exported", effect)
-        if output.inputs["Volume"].is_linked and not output.inputs["Surface"].is_linked:
-            return Lobe("transparent", Constant((1.0, 1.0, 1.0)), output.name)
-        return self.shader(output.inputs["Surface"], ())
+        if output.inputs["Volume"].is_linked:
+            what, effect = "volume is not exported", "the object is without it"
+            self._notes.add("not-carried", self._owner, "Volume", what, effect)
+            if not output.inputs["Surface"].is_linked:
+                return Lobe("transparent", Constant((1.0, 1.0, 1.0)), output.name)
+        shader = self.shader(output.inputs["Surface"], ())
+        found = follow(output.inputs["Displacement"], ())
+        if not isinstance(found, Output):
+            return shader
+        return self._displaced(shader, found, material.displacement_method)
+
+    def _displaced(self, shader: Shader, found: Output, method: str) -> Shader:
+        """A shader with bumps of a displacement where it has no normals of its own."""
+        node, bumps, effect = found.node, None, "the surface is smooth"
+        if node.type == "DISPLACEMENT" and method != "DISPLACEMENT":
+            height, scale = (self.value(node.inputs[name], found.groups) for name in ("Height", "Scale"))
+            if isinstance(height, Constant):
+                return shader  # moved as a whole, if at all
+            bumps = Bump(_exact(height), scale.number) if isinstance(scale, Constant) else None
+            effect = "the surface has its normals alone"
+        if bumps is None or any(normal is not None for normal in normals_of(shader)):
+            self._notes.add(
+                "not-carried", self._owner, "Displacement", "displacement is not exported", effect
+            )
+            return shader
+        if method == "BOTH":
+            what, effect = "displacement is a bump map", "outlines are smooth, and nothing is moved"
+            self._notes.add("approximated", self._owner, "Displacement", what, effect)
+        return bumped(shader, bumps)
 
     def shader(self, socket: Any, groups: tuple[Any, ...]) -> Shader:
         """Shader that is linked to an input."""

@@ -112,6 +112,14 @@ PRINCIPLED = (
     ),
     ("Normal Map of another UV map than its image's", "baked", "a `normalmap` of each mesh"),
     (
+        "Displacement node, Bump Only",
+        "mapped",
+        "`bumpmap` where the shader has no normals of its own; heights are those of an object without scale",
+    ),
+    ("Displacement and Bump", "approximated", "`bumpmap`: outlines are smooth"),
+    ("Displacement Only, vectors, beside normals of its own", "not carried", "the surface is smooth"),
+    ("Volume", "not carried", "the object is without it"),
+    (
         "Coat",
         "mapped",
         "`blendbsdf` with a `roughconductor` of k = 0",

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 Matrix3 = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
@@ -239,6 +239,21 @@ class Nothing:
 
 
 Shader = Principled | Lobe | Emission | Mix | Add | Nothing
+
+
+def bumped(shader: Shader, bumps: Bump) -> Shader:
+    """A shader, all of whose lobes have bumps."""
+    if isinstance(shader, Mix | Add):
+        return replace(shader, first=bumped(shader.first, bumps), second=bumped(shader.second, bumps))
+    is_lobe = isinstance(shader, Principled) or (isinstance(shader, Lobe) and shader.kind != "transparent")
+    return replace(shader, normal=bumps) if is_lobe else shader
+
+
+def normals_of(shader: Shader) -> list[Normal]:
+    """Normals of the lobes of a shader."""
+    if isinstance(shader, Mix | Add):
+        return normals_of(shader.first) + normals_of(shader.second)
+    return [shader.normal] if isinstance(shader, Principled | Lobe) else []
 
 
 def values_of(shader: Any) -> Iterator[Value | ProceduralNormal]:

@@ -309,6 +309,7 @@ def heights(_folder):
     new_file()
     coarse = image("coarse", _grey_ramp, 64, space="Non-Color")
     fine = image("fine", _grey_ramp, 64, space="Non-Color", is_float=True)
+    _displaced(coarse)
     names = "below 0", "low", "as it is", "beside noise", "normals", "rough", "polished"
     for number, name in enumerate(names):
         material, tree, bsdf = shader(name, "BsdfPrincipled", Metallic=1.0, Roughness=0.5)
@@ -325,6 +326,19 @@ def heights(_folder):
         bumps = node_of(tree, "Bump", Height=height, Distance=0.3)
         fill(tree, bsdf, {"Roughness": height} if name in ("rough", "polished") else {"Normal": bumps})
         plane(name, (2.0 * number, 0.0, 0.0), 1.5, material)
+
+
+def _displaced(heights):
+    """Displacement nodes: as bumps, as bumps and moved, moved alone, and beside bumps of the shader."""
+    kinds = {"bumps": "BUMP", "moved and bumps": "BOTH", "moved": "DISPLACEMENT", "own bumps": "BUMP"}
+    for number, (name, method) in enumerate(kinds.items()):
+        material, tree, bsdf = shader(name, "BsdfPrincipled")
+        material.displacement_method = method
+        if name == "own bumps":
+            fill(tree, bsdf, {"Normal": node_of(tree, "Bump", Height=heights)})
+        relief = node_of(tree, "Displacement", Height=heights, Scale=0.3)
+        fill(tree, tree.nodes["Material Output"], {"Displacement": relief})
+        plane(name, (2.0 * number, 2.0, 0.0), 1.5, material)
 
 
 def copies_in_the_world(_folder):
