@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from enfilade_blender.materials.table import markdown
+from support.carried_over import markdown
 
 DOCS = Path(__file__).parents[2] / "docs" / "blender.md"
 BEGIN, END = "<!-- mapping: written by tests/blender -->\n", "<!-- end of mapping -->"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What becomes of each node and socket. The exporter reads these tables, and so does the documentation."""
+"""What the exporter knows of nodes and sockets, by their types and names."""
 
 from __future__ import annotations
 
@@ -14,47 +14,30 @@ class LobeKind:
     ----------
     lobe : str
         See :class:`enfilade_blender.materials.values.Lobe`.
-    becomes : str
-        Mitsuba's plugin.
     note, effect : str
         What is approximated, and what that means; empty where nothing is.
     """
 
     lobe: str
-    becomes: str
     note: str = ""
     effect: str = ""
 
 
 LOBES = {
-    "BSDF_DIFFUSE": LobeKind("diffuse", "`diffuse`"),
-    "BSDF_GLOSSY": LobeKind("glossy", "`conductor` or `roughconductor` without Fresnel"),
-    "BSDF_METALLIC": LobeKind(
-        "glossy",
-        "`conductor` or `roughconductor`",
-        "the edge tint is left out",
-        "metal is darker at grazing angles",
-    ),
-    "BSDF_GLASS": LobeKind("glass", "`dielectric` or `roughdielectric`"),
-    "BSDF_REFRACTION": LobeKind(
-        "glass",
-        "`dielectric` or `roughdielectric`",
-        "glass, which also reflects",
-        "the surface has reflections",
-    ),
-    "BSDF_TRANSPARENT": LobeKind("transparent", "`mask`"),
-    "BSDF_TRANSLUCENT": LobeKind("translucent", "`principledthin`"),
+    "BSDF_DIFFUSE": LobeKind("diffuse"),
+    "BSDF_GLOSSY": LobeKind("glossy"),
+    "BSDF_METALLIC": LobeKind("glossy", "the edge tint is left out", "metal is darker at grazing angles"),
+    "BSDF_GLASS": LobeKind("glass"),
+    "BSDF_REFRACTION": LobeKind("glass", "glass, which also reflects", "the surface has reflections"),
+    "BSDF_TRANSPARENT": LobeKind("transparent"),
+    "BSDF_TRANSLUCENT": LobeKind("translucent"),
     "SUBSURFACE_SCATTERING": LobeKind(
-        "diffuse", "`diffuse`", "diffuse reflection", "light does not spread below the surface"
+        "diffuse", "diffuse reflection", "light does not spread below the surface"
     ),
-    "BSDF_SHEEN": LobeKind(
-        "diffuse", "`diffuse`", "diffuse reflection", "edges are not brighter than the middle"
-    ),
-    "BSDF_TOON": LobeKind("diffuse", "`diffuse`", "diffuse reflection", "light has no steps"),
-    "BSDF_HAIR": LobeKind("glossy", "`roughconductor`", "a glossy surface", "highlights of hair differ"),
-    "BSDF_HAIR_PRINCIPLED": LobeKind(
-        "diffuse", "`diffuse`", "diffuse reflection", "highlights of hair are missing"
-    ),
+    "BSDF_SHEEN": LobeKind("diffuse", "diffuse reflection", "edges are not brighter than the middle"),
+    "BSDF_TOON": LobeKind("diffuse", "diffuse reflection", "light has no steps"),
+    "BSDF_HAIR": LobeKind("glossy", "a glossy surface", "highlights of hair differ"),
+    "BSDF_HAIR_PRINCIPLED": LobeKind("diffuse", "diffuse reflection", "highlights of hair are missing"),
 }
 COLOUR_NODES = {  # functions of their inputs alone
     "RGB", "VALUE", "MATH", "VECT_MATH", "MIX", "MIX_RGB", "VALTORGB", "CURVE_RGB", "CURVE_FLOAT",
@@ -77,227 +60,3 @@ OBJECT_DATA = {  # nodes that a bake on a copy of the object does not evaluate a
     "SHADERTORGB": "the light on a surface is no colour in Cycles, where the input's own value holds",
 }
 OBJECT_EFFECT = "the surface differs where it depends on that"
-PRINCIPLED = (
-    (
-        "Base Color, Metallic 0",
-        "mapped",
-        "`diffuse` under a dielectric interface: `plastic` or `roughplastic`",
-    ),
-    ("Base Color, Metallic 1", "mapped", "`conductor` or `roughconductor`, of a fitted index of refraction"),
-    ("Metallic in between, or textured", "mapped", "`blendbsdf` of both"),
-    ("Base Color of a metal, textured", "approximated", "its reflectance; no brighter edges"),
-    (
-        "Roughness",
-        "mapped",
-        "GGX, alpha its square; multiple scattering is added, but for metals and glass of textured colour",
-    ),
-    (
-        "Roughness of 0.8 and more without Metallic",
-        "mapped",
-        "`diffuse`, lighter by the mean of its reflections",
-    ),
-    ("Roughness, textured", "mapped", "`blendbsdf` of two plastics; `alpha` on metals"),
-    ("IOR, Specular IOR Level", "mapped", "index of refraction of the interface"),
-    ("Transmission Weight", "mapped", "`dielectric` or `roughdielectric`; `blendbsdf` in between"),
-    ("Alpha", "mapped", "`mask`"),
-    (
-        "Emission Color, Emission Strength",
-        "mapped",
-        "`area` emitter; meshes that are open, partly transparent, or around something shine on both sides",
-    ),
-    (
-        "Normal: Normal Map, Bump of images",
-        "mapped",
-        "`normalmap`, `bumpmap`; mirrored UV maps and the backs of open meshes have maps of their own",
-    ),
-    ("Normal Map of another UV map than its image's", "baked", "a `normalmap` of each mesh"),
-    (
-        "Displacement node, Bump Only",
-        "mapped",
-        "`bumpmap` where the shader has no normals of its own; heights are those of an object without scale",
-    ),
-    ("Displacement and Bump", "approximated", "`bumpmap`: outlines are smooth"),
-    ("Displacement Only, vectors, beside normals of its own", "not carried", "the surface is smooth"),
-    ("Volume", "not carried", "the object is without it"),
-    (
-        "Coat",
-        "mapped",
-        "`blendbsdf` with a `roughconductor` of k = 0",
-    ),
-    ("Coat Tint, Coat Normal", "not carried", "the coat is clear and even"),
-    ("Sheen", "approximated", "a rough dielectric layer"),
-    ("Anisotropic", "approximated", "`alpha_u`, `alpha_v` of metals along the UV map; left out if textured"),
-    ("Anisotropic Rotation", "not carried", "highlights are stretched along the UV map"),
-    ("Specular Tint", "approximated", "on metals a colour at edges; else left out"),
-    ("Diffuse Roughness", "not carried", "the surface is Lambertian"),
-    ("Subsurface", "approximated", "diffuse reflection of the base colour"),
-    ("Thin Film", "not carried", "no interference colours"),
-)
-INPUTS = (
-    ("Constants, RGB, Value", "mapped", "numbers"),
-    (
-        "Image Texture with UV Map and Mapping, or a channel of it",
-        "mapped",
-        "`bitmap` with `to_uv`, `wrap_mode`, `filter_type`, `raw`",
-    ),
-    (
-        "Attribute of vertices, corners or faces",
-        "mapped",
-        "`mesh_attribute`; baked: light, its alpha or number, several in one material, what nodes make of it",
-    ),
-    ("Image of the extension Clip whose border lies on the mesh", "baked", "a bitmap of each mesh"),
-    ("Colour corrections of images on the UV map", "baked", "a bitmap over the unit square of the images"),
-    ("Baked heights and normals", "baked", "OpenEXR files of 32 bits"),
-    (
-        "Everything else: noise, ramps, Object and Generated coordinates",
-        "baked",
-        "a bitmap of each mesh, on UVs of its own; those of a material share an atlas",
-    ),
-    (
-        "Fresnel, Layer Weight below Glossy in a Mix Shader",
-        "mapped",
-        "`plastic`, `thindielectric` or a layer",
-    ),
-    ("Fresnel, Layer Weight elsewhere", "approximated", "baked as seen along the normal"),
-    ("Coordinates and vectors of the camera", "approximated", "baked: the same from all directions"),
-    (
-        "Random of objects and islands; properties; attributes of edges, instances, particles and hairs",
-        "approximated",
-        "another number, or 0",
-    ),
-    (
-        "Geometry: Position, Normal; coordinates of another object; Vector Transform of the world",
-        "baked",
-        "each copy of an object by itself; of more than 64 copies as at the first one's place",
-    ),
-    ("Light Path", "approximated", "0: all rays see one material"),
-    (
-        "Mix with Transparent by Light Path, as of unlit glTF materials",
-        "approximated",
-        "the other shader, for all rays",
-    ),
-    ("Missing image, or first frame of an image sequence", "approximated", "a mid grey"),
-)
-LIGHTS = (
-    ("Point", "mapped", "`sphere` of its radius, not seen by the camera; `point` for radius 0"),
-    (
-        "Spot",
-        "approximated",
-        "`spot`, also oval: its blend is fitted by a linear ramp; its radius is left out: shadows are sharp",
-    ),
-    (
-        "Soft Falloff of points and spots",
-        "approximated",
-        "falloff is quadratic: surfaces nearer than three radii are brighter",
-    ),
-    (
-        "Area: square, rectangle, disk, ellipse",
-        "mapped",
-        "`rectangle` or `disk`; not seen by the camera",
-    ),
-    ("Sun of angle 0, or beside another sun", "mapped", "`directional`"),
-    ("Sun with an angle", "mapped", "a disc in the environment map"),
-    (
-        "Nodes of lights: emissions of constants and what is computed of them, sums, mixes, Light Falloff",
-        "mapped",
-        "a factor; falloff is quadratic",
-    ),
-    ("Point or area that the camera sees", "approximated", "a black surface that emits, and casts shadows"),
-    ("Area that is a portal", "mapped", "left out: it emits nothing"),
-    ("World of one colour", "mapped", "`constant`"),
-    ("World of nodes: HDRI, sky", "baked", "`envmap`"),
-    (
-        "Spread, negative power, emission and world, light and shadow linking, patterns of nodes of lights",
-        "not carried",
-        "light is distributed as without them",
-    ),
-)
-OBJECTS = (
-    ("Mesh, curve, surface, text, metaball", "mapped", "triangles after modifiers, with split normals"),
-    (
-        "Collection, geometry nodes and particle instances, linked duplicates",
-        "mapped",
-        "merged, or `instance` where they are many",
-    ),
-    ("Linked libraries, files of images", "mapped", "within the source's folder and the allowed ones"),
-    ("Animated objects, lamps, materials, worlds and images", "not carried", "as in the first frame"),
-    ("Gamma, curves and white balance of the view", "not carried", "left out"),
-    (
-        "Limits of bounces",
-        "approximated",
-        "`max_depth`: the larger of diffuse and glossy; 2 more with glass; all of transparency with `mask`",
-    ),
-    ("Frame step", "not carried", "every frame is rendered"),
-    ("Hair, point clouds, volumes, grease pencil", "not carried", "missing"),
-    (
-        "Triangles, objects and lamps with a vertex, place or light that is NaN or infinite",
-        "not carried",
-        "missing",
-    ),
-    ("Ray visibility, shadow catcher, holdout, indirect only", "not carried", "visible to all rays"),
-    ("Transparent Shadows switched off", "not carried", "light passes where the surface is transparent"),
-    ("Clipping of cameras", "not carried", "all is visible from the eye on"),
-    (
-        "Cameras below a turned parent of uneven scale",
-        "approximated",
-        "oblique axes become the principal point; shear of the picture itself is left out",
-    ),
-    (
-        "Cameras far from the origin, or within 0.1 units of what they see",
-        "approximated",
-        "shadows are lost near contacts",
-    ),
-    (
-        "Caustics switched off, clamping, Fast GI, limits of bounces of lights and the world",
-        "not carried",
-        "all light counts",
-    ),
-    ("Compositor, sequencer, Freestyle", "not carried", "left out"),
-    (
-        "Overrides of the view layer, further view layers, render region, stereoscopy",
-        "not carried",
-        "left out",
-    ),
-    ("Working spaces of Blender 5 but Linear Rec.709", "not carried", "colours are taken as Linear Rec.709"),
-    ("File of a newer Blender than the one that reads it", "not carried", "what that one does not know"),
-    ("Missing fonts and caches, drivers that need Python", "not carried", "as Blender shows them without"),
-)
-
-
-def markdown() -> str:
-    """The tables as a section of the documentation."""
-    parts = []
-    shaders = [
-        (name.removeprefix("BSDF_").replace("_", " ").capitalize(), _outcome(kind), _becomes(kind))
-        for name, kind in LOBES.items()
-    ]
-    shaders += [
-        (
-            "Mix shader",
-            "mapped",
-            "`blendbsdf`; with Transparent `mask`; with Fresnel `plastic` or `thindielectric`",
-        ),
-        (
-            "Add shader",
-            "approximated",
-            "an `area` emitter beside the other shader; else `blendbsdf` of equal shares",
-        ),
-        ("Emission", "mapped", "`area` emitter"),
-        ("Any other shader", "not carried", "a neutral grey"),
-    ]
-    sections = {
-        "Principled BSDF": PRINCIPLED, "Other shaders": shaders, "Inputs": INPUTS, "Lights and world": LIGHTS,
-        "Objects": OBJECTS,
-    }  # fmt: skip
-    for title, rows in sections.items():
-        parts.append(f"| {title} | outcome | in the exported scene |\n| --- | --- | --- |")
-        parts[-1] += "".join(f"\n| {what} | {how} | {becomes} |" for what, how, becomes in rows)
-    return "\n\n".join(parts) + "\n"
-
-
-def _outcome(kind: LobeKind) -> str:
-    return "approximated" if kind.note else "mapped"
-
-
-def _becomes(kind: LobeKind) -> str:
-    return f"{kind.becomes}: {kind.effect}" if kind.effect else kind.becomes
