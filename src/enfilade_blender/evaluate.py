@@ -40,7 +40,7 @@ SETTINGS = {  # of a render of nothing
     "use_freestyle": False,  # it draws with EEVEE, and its modules run scripts
 }
 UV_NODES = ("UVMAP", "NORMAL_MAP", "TANGENT")  # that name a UV map
-RAYS = ("camera", "diffuse", "glossy", "transmission", "shadow")
+RAYS_OF_OBJECTS = ("camera", "diffuse", "glossy", "transmission", "shadow")
 RAYS_OF_LAMPS = ("diffuse", "glossy", "transmission")
 
 
@@ -128,7 +128,7 @@ def _read(graph: Any, result: Evaluated, limits: Limits, notes: Notes) -> None:
             )
         elif obj.type == "LIGHT":
             _note_linking(obj, notes)
-            _note_rays(obj, RAYS_OF_LAMPS, "it lights all surfaces", notes)
+            note_rays(obj.name, obj, RAYS_OF_LAMPS, "it lights all surfaces", notes)
             lamp = Lamp(instance_name(instance), obj.data.original, matrix, is_visible=obj.visible_camera)
             result.lamps.append(lamp)
         elif obj.type in NOT_CARRIED:
@@ -217,19 +217,22 @@ def _note_linking(obj: Any, notes: Notes) -> None:
         notes.add("not-carried", obj.name, "Shadow linking", what, effect)
 
 
-def _note_rays(obj: Any, rays: tuple[str, ...], effect: str, notes: Notes) -> None:
-    hidden = [ray for ray in rays if not getattr(obj, f"visible_{ray}", True)]
+def note_rays(
+    name: str, of: Any, rays: tuple[str, ...], effect: str, notes: Notes, prefix: str = "visible_"
+) -> None:
+    """Note the rays of which settings with a prefix say that they miss an object, lamp or world."""
+    hidden = [ray for ray in rays if not getattr(of, f"{prefix}{ray}", True)]
     if hidden:
         what = f"hidden from {', '.join(hidden)} rays in Blender"
-        notes.add("not-carried", obj.name, "Ray visibility", what, effect)
+        notes.add("not-carried", name, "Ray visibility", what, effect)
 
 
 def _note_object(instance: Any, notes: Notes) -> None:
     obj, placed = instance.object, instance.parent or instance.object  # an instancer's visibility counts
     _note_linking(obj, notes)
-    _note_rays(obj, RAYS, "it is visible to all rays", notes)
+    note_rays(obj.name, obj, RAYS_OF_OBJECTS, "it is visible to all rays", notes)
     if placed != obj:
-        _note_rays(placed, RAYS, "its instances are visible to all rays", notes)
+        note_rays(placed.name, placed, RAYS_OF_OBJECTS, "its instances are visible to all rays", notes)
     layer, original = bpy.context.view_layer, placed.original
     catches = getattr(obj, "is_shadow_catcher", False) or getattr(obj, "is_holdout", False)
     if catches or original.holdout_get(view_layer=layer) or original.indirect_only_get(view_layer=layer):

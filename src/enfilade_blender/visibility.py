@@ -15,7 +15,7 @@ from enfilade_blender.notes import Notes
 from enfilade_blender.records import Selection, View
 
 SAMPLED_VIEWS = 64
-RAYS = 8, 5  # of a view across and down
+RAYS_OF_VIEWS = 8, 5  # of a view across and down
 EVERY = 5  # of these rays, where there are too many objects for all
 BOXES = 800_000  # of objects that the rays of one kind of note are tested against: 1.2 s
 LISTED = 3  # objects that are named
@@ -25,7 +25,7 @@ FAR = 1e4  # scene units, to a point in the sun's direction
 
 def cast_count(instances: int) -> int:
     """Number of rays that are cast at a scene for a kind of note: Blender tests each against all objects."""
-    return max(BOXES // max(instances, 1), math.prod(RAYS) // EVERY)
+    return max(BOXES // max(instances, 1), math.prod(RAYS_OF_VIEWS) // EVERY)
 
 
 def note_sun(sun: Sun | None, views: list[View], selection: Selection, notes: Notes, *, casts: int) -> None:
@@ -51,7 +51,7 @@ def note_depths(views: list[View], selection: Selection, notes: Notes, *, casts:
     """
     graph = bpy.context.evaluated_depsgraph_get()
     clipped: dict[tuple[str, str], dict[str, None]] = {}  # objects by camera and setting
-    rays = math.prod(RAYS)
+    rays = math.prod(RAYS_OF_VIEWS)
     step = 1 if casts >= rays * min(len(views), SAMPLED_VIEWS) else EVERY
     for view in _spread(views, casts * step // rays):
         near, far = (view.projection[2, 3] / (view.projection[2, 2] + sign) for sign in (-1.0, 1.0))
@@ -82,7 +82,7 @@ def _spread(views: list[View], count: int) -> list[View]:
 
 def _directions(view: View) -> list[np.ndarray]:
     """World directions of unit depth, spread over a view."""
-    across, down = (2.0 * (np.arange(count) + 0.5) / count - 1.0 for count in RAYS)
+    across, down = (2.0 * (np.arange(count) + 0.5) / count - 1.0 for count in RAYS_OF_VIEWS)
     x, y = np.meshgrid(across, down)
     local = np.stack(
         [

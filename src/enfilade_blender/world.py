@@ -10,6 +10,7 @@ from typing import Any
 import bpy
 import numpy as np
 
+from enfilade_blender.evaluate import note_rays
 from enfilade_blender.image_files import F32, write_exr
 from enfilade_blender.lights import Sun
 from enfilade_blender.materials.graph import Graph
@@ -25,7 +26,7 @@ from enfilade_blender.scene_xml import Element, plugin
 WIDTH, WIDTH_SUN, WIDTH_MAX = 1024, 2048, 4096
 SAMPLES, SAMPLES_SKY = 4, 16  # a pixel; the sun of a sky is smaller than one
 LOCAL_FROM_WORLD = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], np.float64)
-RAYS = ("camera", "diffuse", "glossy", "transmission")
+RAYS_OF_WORLDS = ("camera", "diffuse", "glossy", "transmission")
 FILE = "textures/environment.exr"
 
 
@@ -174,10 +175,8 @@ def _note_world(selection: Selection, notes: Notes) -> None:
         notes.add("not-carried", scene.name, "Film: Transparent", "the background is opaque", effect)
     if world is None:
         return
-    hidden = [ray for ray in RAYS if not getattr(world.cycles_visibility, ray)]
-    if hidden:
-        what = f"hidden from {', '.join(hidden)} rays in Blender"
-        notes.add("not-carried", world.name, "Ray visibility", what, "the world is seen by all rays")
+    effect = "the world is seen by all rays"
+    note_rays(world.name, world.cycles_visibility, RAYS_OF_WORLDS, effect, notes, prefix="")
     if not world.use_nodes or world.node_tree is None:
         return
     if any(node.type == "OUTPUT_WORLD" and node.inputs["Volume"].is_linked for node in world.node_tree.nodes):

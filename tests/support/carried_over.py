@@ -143,6 +143,7 @@ LIGHTS = (
     ),
     ("Point or area that the camera sees", "approximated", "a black surface that emits, and casts shadows"),
     ("Area that is a portal", "mapped", "left out: it emits nothing"),
+    ("Lamps and emitting meshes without area", "not carried", "they give no light"),
     ("World of one colour", "mapped", "`constant`"),
     ("World of nodes: HDRI, sky", "baked", "`envmap`"),
     (
@@ -159,7 +160,11 @@ OBJECTS = (
         "merged, or `instance` where they are many",
     ),
     ("Linked libraries, files of images", "mapped", "within the source's folder and the allowed ones"),
-    ("Animated objects, lamps, materials, worlds and images", "not carried", "as in the first frame"),
+    (
+        "Animated objects, lamps, materials, worlds, images and exposure",
+        "not carried",
+        "as in the first frame",
+    ),
     ("Gamma, curves and white balance of the view", "not carried", "left out"),
     (
         "Limits of bounces",

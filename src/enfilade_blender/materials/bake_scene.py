@@ -22,7 +22,7 @@ BakeKind = Literal["colour", "number", "normal"]
 MARGIN_PX = 8
 ISLAND_MARGIN = 0.01  # of the square
 SMART_ANGLE = 1.15  # radians, Blender's default of 66 degrees
-WHITE = (1.0, 1.0, 1.0, 1.0)
+OBJECT_COLOUR = (1.0, 1.0, 1.0, 1.0)
 LIT_PX = 8  # of a square in even light
 TARGET, GENERATED = "enfilade target", "enfilade generated"
 TEXTURES = {  # whose coordinates are generated ones where none are linked
@@ -107,7 +107,7 @@ class BakeScene:
 
     @contextmanager
     def _canvas(
-        self, data: Any, matrix: np.ndarray, colour: tuple[float, ...] = WHITE, index: int = 0
+        self, data: Any, matrix: np.ndarray, colour: tuple[float, ...] = OBJECT_COLOUR, index: int = 0
     ) -> Iterator[Canvas]:
         obj = bpy.data.objects.new("enfilade bake", data)
         obj.matrix_world = matrix.T.tolist()

@@ -7,7 +7,7 @@ from typing import Any
 
 from enfilade_blender.materials.image_pixels import is_missing
 
-BLACK, GREY = (0.0, 0.0, 0.0, 1.0), (0.5, 0.5, 0.5, 1.0)
+NO_RAY, MISSING = (0.0, 0.0, 0.0, 1.0), (0.5, 0.5, 0.5, 1.0)
 IMAGES = ("TEX_IMAGE", "TEX_ENVIRONMENT")
 
 
@@ -19,9 +19,9 @@ def put_stand_ins(tree: Any) -> list[Any]:
             node.node_tree = node.node_tree.copy()
             missing += put_stand_ins(node.node_tree)
         elif node.type == "LIGHT_PATH":
-            _replace(tree, node, BLACK)
+            _replace(tree, node, NO_RAY)
         elif node.type in IMAGES and is_missing(node.image, node.image_user):
-            _replace(tree, node, GREY)
+            _replace(tree, node, MISSING)
             missing.append(node)
     return missing
 

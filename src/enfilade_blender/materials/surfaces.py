@@ -31,7 +31,7 @@ from enfilade_blender.materials.values import (
 )
 from enfilade_blender.scene_xml import Element, plugin
 
-WHITE = Constant((1.0, 1.0, 1.0))
+ONE = Constant((1.0, 1.0, 1.0))
 BLACK = (0.0, 0.0, 0.0)
 
 
@@ -60,7 +60,7 @@ class Surface:
     """
 
     bsdf: Element | None
-    opacity: Value = WHITE
+    opacity: Value = ONE
     opacity_is_inverted: bool = False
     emitted: tuple[Radiance, ...] = ()
 
@@ -178,7 +178,7 @@ def _interface(below: Shader, above: Lobe, ior: float, context: Context) -> Surf
         return Surface(plugin("bsdf", "thindielectric", int_ior=ior, ext_ior=1.0, **tints))
     surface = build(below, context)
     tint = context.textures.mean(above.colour)
-    return replace(surface, bsdf=layered(surface.plain(), WHITE, ior, above.roughness, tint, context))
+    return replace(surface, bsdf=layered(surface.plain(), ONE, ior, above.roughness, tint, context))
 
 
 def _cut_out(
@@ -273,7 +273,7 @@ def _radiance(colour: Value, strength: Value, context: Context) -> tuple[Radianc
 
 def _takes_light(colour: Value, strength: Value) -> bool:
     """Whether an emission is negative by its constants."""
-    first, second = (value if isinstance(value, Constant) else WHITE for value in (colour, strength))
+    first, second = (value if isinstance(value, Constant) else ONE for value in (colour, strength))
     return min(a * b for a, b in zip(first.colour, second.colour, strict=True)) < 0.0
 
 

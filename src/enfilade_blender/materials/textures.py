@@ -23,7 +23,6 @@ from enfilade_blender.materials.values import (
     AttributeValue,
     Constant,
     ImageValue,
-    Procedural,
     Texture,
     Value,
 )
@@ -42,7 +41,7 @@ SIGNATURES = (
 CMYK_DEPTH = 32  # bits of a pixel of a JPEG file, which Mitsuba reads with 8 and 24
 WRAP = {"REPEAT": "repeat", "EXTEND": "clamp", "CLIP": "clamp", "MIRROR": "mirror"}
 FLIP = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])  # Mitsuba's first row is at v = 0
-GREY = (0.5, 0.5, 0.5)  # of a missing image
+MISSING = (0.5, 0.5, 0.5)  # of a missing image
 LONGEST_STEM = 120  # bytes of a file's name, to which a number and an ending are added
 
 
@@ -119,7 +118,7 @@ class Textures:
         if self.has_pixels(value):
             mean = self.pixels(value).reshape(-1, 3).mean(axis=0)
             return float(mean[0]), float(mean[1]), float(mean[2])
-        return GREY
+        return MISSING
 
     def pixels(self, value: ImageValue | Texture) -> F32:
         """Linear values of a texture (H, W, 3), the first row on top."""
@@ -203,15 +202,15 @@ class Textures:
             if f"textures/{file.name}" not in named:
                 file.unlink()
 
-    def _texture(self, value: Value) -> Element | Any:
+    def _texture(self, value: Value) -> Element:
         if isinstance(value, Texture):
             return self._bitmap(value, value.file, raw=value.raw)
         if isinstance(value, AttributeValue):
             return plugin("texture", "mesh_attribute", name="vertex_color")
-        if isinstance(value, Procedural):
+        if not isinstance(value, ImageValue):
             raise TypeError("procedural values are baked before they are written")
-        if not isinstance(value, ImageValue) or self.is_missing(value):
-            return plugin("texture", "srgb", color=GREY)
+        if self.is_missing(value):
+            return plugin("texture", "srgb", color=MISSING)
         file, raw = self._file(value)
         return self._bitmap(value, file, raw=raw)
 
