@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from itertools import islice
 from typing import Any
 
 import bpy
@@ -16,6 +17,7 @@ from enfilade_blender.notes import Notes
 from enfilade_blender.records import Selection
 
 BUDGET = 2_000_000  # objects and instances that are compared in all frames: each takes some microseconds
+COMPARED = 100_000  # objects and instances of a frame: each takes 500 bytes
 LISTED = 20  # objects that are named
 TOLERANCE = 1e-5
 DEFORMING = ("MESH_CACHE", "MESH_SEQUENCE_CACHE", "CLOTH", "SOFT_BODY", "OCEAN", "WAVE", "FLUID", "BUILD")
@@ -34,6 +36,8 @@ class Motion:
     def __init__(self, selection: Selection, limits: Limits) -> None:
         self._selection, self._limits = selection, limits
         self._objects = selection.objects()
+        self._rendered = set(self._objects)
+        self._objects += [obj for obj in selection.scene.objects if obj not in self._rendered]  # as cutters
         self._first: dict[Any, Any] = {}
         self._changed: dict[Any, None] = {}
         self._shown: set[str] = set()
@@ -117,7 +121,7 @@ class Motion:
         for obj in self._objects:
             bones = [bone.matrix.copy() for bone in obj.pose.bones] if obj.type == "ARMATURE" else ()
             state["place", obj.name] = (obj.matrix_world.copy(), *bones), (float(obj.hide_render),)
-            if obj.hide_render:
+            if obj.hide_render or obj not in self._rendered:
                 continue
             self._shown.add(obj.name)
             if obj.type == "LIGHT":
@@ -125,7 +129,7 @@ class Motion:
                 state["light", obj.name] = (), (obj.data.energy, *obj.data.color, *sizes)
             elif obj.type not in CARRYING:
                 state["shape", obj.name] = _bounds(obj.evaluated_get(graph))
-        for instance in graph.object_instances:
+        for instance in islice(graph.object_instances, COMPARED):
             if not instance.is_instance or instance.parent.original.hide_render:
                 continue
             name, place = instance_name(instance), instance.matrix_world.copy()

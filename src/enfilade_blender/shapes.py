@@ -172,6 +172,10 @@ class Shapes:
                 instanced += self._shapes_of(f"{name} mesh", mesh, material, None)
                 continue
             mesh = joined([mesh.transformed(matrix) for matrix in placed.matrices])
+            if radiance is not None and mesh.area() == 0.0:
+                what, effect = "the emission of a surface without area is left out", "it gives no light"
+                self._notes.add("not-carried", name, "Emission", what, effect)
+                radiance = None
             elements += self._shapes_of(name, mesh, material, radiance)
             if radiance is not None and not (
                 is_one(surface.opacity) and self._hides_its_back(part.mesh, placed)
@@ -251,9 +255,6 @@ class Shapes:
         shape = plugin("shape", "ply", reference(bsdf), filename=file)
         if radiance is not None and mesh.area() > 0.0:
             shape.append(plugin("emitter", "area", radiance=radiance))
-        elif radiance is not None:
-            what, effect = "the emission of a surface without area is left out", "it gives no light"
-            self._notes.add("not-carried", name, "Emission", what, effect)
         return named(shape, self.identifiers.unique(name))
 
     def _shader(self, material: Any) -> Shader:

@@ -361,7 +361,7 @@ def test_what_changes_is_noted(exported):
     changes = {note["object"] for note in result["notes"] if note["node"] == "Animation"}
     assert changes == {
         *("Blinking", "driven", "film", "Growing", "Hooked", "sliding"),
-        *("Swelling", "Vine", "Door", "Copy: Inner", "Of the set", "Emitter: Drop"),
+        *("Swelling", "Vine", "Door", "Copy: Inner", "Of the set", "Emitter: Drop", "Cut"),
     }
     assert ("Scene", "its animation is left out") in notes(result, "not-carried")
     assert result["exposure_ev"] == 0.0

@@ -51,6 +51,7 @@ PER_PIXEL = 2.0  # texels along an object for each pixel of its largest view
 UNIFORM = 2e-3  # standard deviation below which a texture is a constant
 UNIFORM_EXACT = 1e-6  # the same of heights: 0.001 of them may be a steep millimetre
 CONSTANT_PX = 8
+SEEN_COPIES = 10_000  # of a mesh whose sizes in the views are compared
 FLAT = (0.5, 0.5, 1.0)  # a texel of a normal map
 BORDER = 1e-4  # of an image, that coordinates may pass
 UV_MAPS = 8  # that a mesh of Blender can have
@@ -113,8 +114,9 @@ class Bakery:
             with self._stage().square(value.uv_map, value.matrix) as canvas:
                 pixels, _ = canvas.bake(value.output, material, size, _kind(value))
             stored = self._stored(pixels, None, value, material.name, value.uv_map)
-            is_file = isinstance(stored, Texture)
-            self._of_uv[key] = replace(stored, matrix=value.matrix) if is_file else stored
+            if isinstance(stored, Texture):
+                stored = replace(stored, matrix=value.matrix)
+            self._of_uv[key] = stored
         return self._of_uv[key]
 
     def _over_mesh(self, value: Any, material: Any, canvas: Any, placed: Placed, size: int) -> Any:
@@ -197,15 +199,16 @@ class Bakery:
 
     def _resolution(self, copies: list[np.ndarray], mesh: Mesh) -> int:
         """A power of two, by the largest size of a mesh's copies in the views of the path."""
-        local = np.concatenate([mesh.positions.min(axis=0), mesh.positions.max(axis=0)]).reshape(2, 3)
+        bounds = np.stack([mesh.positions.min(axis=0), mesh.positions.max(axis=0)])
+        matrices = np.array(copies[:: max(len(copies) // SEEN_COPIES, 1)])
+        ends = bounds @ matrices[:, :3, :3].transpose(0, 2, 1) + matrices[:, None, :3, 3]
+        centres, radii = ends.mean(axis=1), 0.5 * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1)
         nearest = 0.0
-        for matrix in copies[:: max(len(copies) // 64, 1)]:
-            low, high = (matrix[:3, :3] @ point + matrix[:3, 3] for point in local)
-            centre, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
-            for view in self._views[:: max(len(self._views) // 64, 1)]:
-                distance = max(float(np.linalg.norm(view.pose[:3, 3] - centre)) - radius, 0.25 * radius, 1e-6)
-                focal = 0.5 * view.projection[1, 1] * self._selection.size[1]
-                nearest = max(nearest, 2.0 * radius / distance * focal)
+        for view in self._views[:: max(len(self._views) // 64, 1)]:
+            distances = np.linalg.norm(view.pose[:3, 3] - centres, axis=-1) - radii
+            distances = np.maximum(np.maximum(distances, 0.25 * radii), 1e-6)
+            focal = 0.5 * view.projection[1, 1] * self._selection.size[1]
+            nearest = max(nearest, float((2.0 * radii / distances * focal).max()))
         wanted = nearest * PER_PIXEL if self._views else float(self._job.bake_px)
         power = 2 ** int(np.ceil(np.log2(max(wanted, SMALLEST))))
         return int(min(power, self._job.bake_px))

@@ -167,7 +167,7 @@ class Textures:
         name = image.name if image is not None else "none"
         file = image.filepath if image is not None else ""
         what = f"the image {name} ({file}) {fault(image)}" if image is not None else "there is no image"
-        self._notes.add("approximated", name, value.output.node.name, what, "a mid grey is in its place")
+        self._notes.add("approximated", name, value.node.name, what, "a mid grey is in its place")
         return True
 
     def write(self, name: str, image: F32, *, raw: bool, is_exact: bool = False) -> str:

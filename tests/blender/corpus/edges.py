@@ -547,7 +547,9 @@ def _changed_by_others(scene):
         plane(name, (x, 6.0, 0.0), 1.0, grey)
         for x, name in enumerate(("Door", "Inner", "Of the set", "Cutter"))
     )
-    cutter.hide_render = True
+    scene.collection.children.link(group("Cutters", [cutter]))
+    bpy.data.collections["Cutters"].hide_render = True
+    plane("Cut", (4.0, 8.0, 0.0), 1.0, grey).modifiers.new("Boolean", "BOOLEAN").object = cutter
     emitter = plane("Emitter", (6.0, 6.0, 0.0), 1.0, grey)
     emitter.modifiers.new("Particles", "PARTICLE_SYSTEM")
     bald = plane("Bald", (8.0, 6.0, 0.0), 1.0, grey).modifiers.new("Hair", "PARTICLE_SYSTEM")
