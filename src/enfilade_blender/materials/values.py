@@ -245,8 +245,9 @@ def bumped(shader: Shader, bumps: Bump) -> Shader:
     """A shader, all of whose lobes have bumps."""
     if isinstance(shader, Mix | Add):
         return replace(shader, first=bumped(shader.first, bumps), second=bumped(shader.second, bumps))
-    is_lobe = isinstance(shader, Principled) or (isinstance(shader, Lobe) and shader.kind != "transparent")
-    return replace(shader, normal=bumps) if is_lobe else shader
+    if isinstance(shader, Principled) or (isinstance(shader, Lobe) and shader.kind != "transparent"):
+        return replace(shader, normal=bumps)
+    return shader
 
 
 def normals_of(shader: Shader) -> list[Normal]:
