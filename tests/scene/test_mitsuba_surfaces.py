@@ -172,3 +172,10 @@ def test_distance_counts_in_lengths_of_the_direction(swatches):
     renderer, _, _ = swatches
     found = renderer.surfaces(Rays(Array3f(0, 0, 6), Array3f(0, 0, -2)))
     assert found.distance[0] == pytest.approx(3.0, rel=1e-5)
+
+
+def test_parameters_that_have_no_value_are_no_fault(tmp_path):
+    hairy = [placed("cube", f"cube {x}", (x, 0, 0), '<bsdf type="hair"/>') for x in (-1, 1)]  # no sigma_a
+    renderer = opened(write(tmp_path, *hairy))
+    geometry = find_geometry(renderer, Camera(look_at((0, 0, 5), (0, 0, 0)), 45.0, 32, 16))
+    assert np.unique(geometry.shape_index).tolist() == [0, 1, 2]

@@ -56,9 +56,10 @@ def load_scene(file: Path) -> Any:
             f"{file} has no light, every frame would be black: add an <emitter>; or, in Blender, a lamp or a "
             "world with light, and import it again"
         )
-    for name, values in mi.traverse(scene):
+    parameters = mi.traverse(scene)
+    for name in parameters.keys():  # noqa: SIM118  (values are fetched one by one: some can't be)
         if name.endswith(".data"):  # of bitmaps, environment maps and grids
-            _check_finite(file, name.removesuffix(".data"), np.asarray(values))
+            _check_finite(file, name.removesuffix(".data"), np.asarray(parameters[name]))
     return scene
 
 

@@ -193,8 +193,9 @@ def _key(item: _Placed) -> Any:
 
 def _attributes(shape: Any) -> dict[str, Any]:
     """What the vertices and triangles of a shape have, as far as it can be set."""
-    parameters = mi.traverse(shape).items()
-    return {name: value for name, value in parameters if name.startswith(("vertex_", "face_"))}
+    parameters = mi.traverse(shape)
+    names = (name for name in parameters.keys() if name.startswith(("vertex_", "face_")))  # noqa: SIM118
+    return {name: parameters[name] for name in names}
 
 
 def _merged(name: str, items: Sequence[_Placed]) -> Any:
