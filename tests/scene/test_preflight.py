@@ -95,10 +95,32 @@ def test_a_scene_that_takes_too_much_is_refused(scene):
     image = '<texture type="bitmap"><string name="filename" value="large.png"/></texture>'
     file = scene(f'<shape type="sphere"><bsdf type="diffuse">{image}</bsdf></shape>')
     Image.new("L", (12_000, 12_000)).save(file.parent / "large.png", compress_level=1)
-    with pytest.raises(SceneError, match=r"was too much for .*512 MB of memory|can't load"):
+    with pytest.raises(SceneError, match=r"needs more than 512 MB of memory|can't load"):
         checked(file, preflight_mb=512)
     with pytest.raises(SceneError, match=r"was not loaded in 0\.1 s"):  # in which Mitsuba does not start
         checked(file, preflight_s=0.1)
+
+
+@pytest.mark.parametrize(
+    ("end", "words"),
+    [
+        ("raise KeyError('colour')", r"was not loaded: KeyError: 'colour'; this is a defect of enfilade"),
+        (r"print('use of %mask\n   ^', file=sys.stderr); os.abort()", "by SIGABRT: use of %mask; .* report"),
+        (
+            "print('bad_alloc', file=sys.stderr); os.abort()",
+            "by SIGABRT: bad_alloc; .* more than .* MB of memory",
+        ),
+        ("os.kill(os.getpid(), 9)", "by SIGKILL; .* more than .* MB of memory"),
+    ],
+)
+def test_ends_of_its_process_are_told_apart(scene, tmp_path, monkeypatch, end, words):
+    (tmp_path / "sitecustomize.py").write_text(
+        "import os, sys\nfrom enfilade.scene.mitsuba import files\n"
+        f"def check_scene(*_): {end}\nfiles.check_scene = check_scene\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
+    with pytest.raises(SceneError, match=words):
+        checked(scene(BALL))
 
 
 @pytest.fixture

@@ -8,9 +8,7 @@ from enum import Enum
 
 from enfilade import errors
 from enfilade.files import is_passing
-
-# Dr.Jit's messages of too little memory; the second one while it records a kernel.
-OUT_OF_MEMORY = ("out of memory", "tried to free the allocation cache", "bad_alloc")
+from enfilade.resource_limits import is_out_of_memory
 
 
 class FailureKind(Enum):
@@ -58,7 +56,7 @@ def _is_memory(error: BaseException | None) -> bool:
     while error is not None:
         if isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno == errno.ENOMEM):
             return True
-        if isinstance(error, RuntimeError) and any(words in str(error).lower() for words in OUT_OF_MEMORY):
+        if isinstance(error, RuntimeError) and is_out_of_memory(str(error)):
             return True
         error = error.__cause__ or error.__context__
     return False

@@ -20,6 +20,7 @@ from typing import Any
 
 from enfilade.errors import EnfiladeError
 from enfilade.files import unwritable
+from enfilade.resource_limits import cause_of_end
 from enfilade.runs.child import WorkerTerms, serve
 from enfilade.runs.executor import Ended, Order
 from enfilade.runs.failure import Failure, FailureKind
@@ -171,7 +172,7 @@ class Processes:
         has_starved = code == -signal.SIGKILL and oom_kills() > child.oom_kills
         kind = FailureKind.MEMORY if has_starved else FailureKind.ERROR
         why = ", by the kernel, for lack of memory" if has_starved else ""
-        return Ended(slot, Failure(kind, f"its worker {_cause(code)}{why}", _tail(child.log)))
+        return Ended(slot, Failure(kind, f"its worker {cause_of_end(code)}{why}", _tail(child.log)))
 
     def _killed(self, slot: int) -> Ended:
         child = self._children[slot]
@@ -197,15 +198,6 @@ class Processes:
             if not child.log.stat().st_size:
                 child.log.unlink()
         return -signal.SIGKILL if child.process.exitcode is None else child.process.exitcode
-
-
-def _cause(code: int) -> str:
-    if code >= 0:
-        return f"ended with exit code {code}"
-    try:
-        return f"was killed by {signal.Signals(-code).name}"
-    except ValueError:
-        return f"was killed by signal {-code}"
 
 
 def _tail(log: Path) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -12,8 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from enfilade.errors import SceneError
-from enfilade.resource_limits import die_with, limit_memory
+from enfilade.resource_limits import cause_of_end, die_with, is_out_of_memory, limit_memory
 from enfilade.settings import LimitSettings, Settings, TraceSettings
+
+STARVED = (-signal.SIGKILL, -signal.SIGSEGV)  # exit codes of processes that may have lacked memory
+WORD = re.compile(r"[^\W\d_]{2}")
 
 
 @dataclass(frozen=True)
@@ -69,18 +73,22 @@ def preflight(scene: Path, trace: TraceSettings, limits: LimitSettings, variant:
             "--set limits.preflight_s"
         )
     if done.returncode:
-        *_, last = ("", *done.stderr.strip().splitlines())
-        bound = "the memory of the GPU"
-        if not variant.startswith("cuda"):
-            bound = f"{limits.preflight_mb} MB of memory (--set limits.preflight_mb)"
-        raise SceneError(
-            f"{scene} was too much for the preflight process (exit code {done.returncode}{last and ': '}"
-            f"{last}): it is damaged, or needs more than {bound}"
-        )
+        is_gpu = variant.startswith("cuda")
+        bound = f"{limits.preflight_mb} MB of memory (--set limits.preflight_mb)"
+        raise SceneError(f"{scene}: {_end(done, 'the memory of the GPU' if is_gpu else bound)}")
     answer = json.loads(done.stdout)
     if error := answer.pop("error"):
         raise SceneError(error)
     return Preflight(**answer)
+
+
+def _end(child: subprocess.CompletedProcess[str], bound: str) -> str:
+    """The sentence about a process that crashed; `bound` is the memory that it had."""
+    *_, last = ("", *(line.strip() for line in child.stderr.splitlines() if WORD.search(line)))
+    end = f"the preflight process {cause_of_end(child.returncode)}{last and ': '}{last}"
+    if child.returncode in STARVED or is_out_of_memory(child.stderr):
+        return f"{end}; the scene is damaged, or needs more than {bound}"
+    return f"{end}; Mitsuba can't render the scene, or enfilade has a defect: please report it"
 
 
 def _main(scene: Path, tables: str, variant: str, parent: int) -> None:
@@ -94,7 +102,6 @@ def _main(scene: Path, tables: str, variant: str, parent: int) -> None:
 
     activate("gpu" if is_gpu else "cpu")
     from enfilade.scene.mitsuba.files import check_scene
-    from enfilade.scene.mitsuba.load import OUT_OF_MEMORY
     from enfilade.scene.mitsuba.renderer import MitsubaRenderer
 
     if not is_gpu:  # CUDA maps the memory of the GPU into the address space
@@ -106,10 +113,13 @@ def _main(scene: Path, tables: str, variant: str, parent: int) -> None:
         answer |= asdict(Preflight(renderer.why_inseparable, renderer.ignored))
     except SceneError as error:
         answer["error"] = str(error)
-    except RuntimeError as error:  # of Mitsuba
-        if any(words in str(error).lower() for words in OUT_OF_MEMORY):
+    except Exception as error:
+        text = f"{type(error).__name__}: {error}"
+        if is_out_of_memory(text):
             raise
-        answer["error"] = f"Mitsuba can't render {scene}: {error}"
+        answer["error"] = f"{scene} was not loaded: {text}; this is a defect of enfilade: please report it"
+        if isinstance(error, RuntimeError):  # of Mitsuba
+            answer["error"] = f"Mitsuba can't render {scene}: {error}"
     os.write(out, json.dumps(answer).encode())
 
 

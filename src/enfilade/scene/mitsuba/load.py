@@ -11,9 +11,8 @@ import mitsuba as mi
 import numpy as np
 
 from enfilade.errors import SceneError
+from enfilade.resource_limits import is_out_of_memory
 from enfilade.scene.mitsuba.files import fingerprint, reason
-
-OUT_OF_MEMORY = ("out of memory", "bad_alloc")  # in errors of Dr.Jit and C++
 
 
 def load_scene(file: Path) -> Any:
@@ -38,7 +37,7 @@ def load_scene(file: Path) -> Any:
     try:
         scene = mi.load_file(str(file.resolve()), parallel=False, optimize=False)
     except (RuntimeError, UnicodeDecodeError) as error:
-        if any(words in str(error).lower() for words in OUT_OF_MEMORY):
+        if is_out_of_memory(str(error)):
             raise MemoryError(f"too little memory to load {file}") from error
         fingerprint(file)  # raises with the cause if a file is missing or can't be read
         raise SceneError(f"Mitsuba can't load {file}: {reason(error)}") from error
