@@ -26,6 +26,13 @@ def test_mitsuba_reads_xml(scene):
     assert Scene.from_json(of.to_json()) == of
 
 
+def test_a_scene_that_mitsuba_loads_and_does_not_render(scene):
+    hot = '<spectrum name="intensity" type="blackbody"><float name="temperature" value="4000"/></spectrum>'
+    of = Scene(scene(f'{BALL}<emitter type="point">{hot}</emitter>'))
+    with pytest.raises(SceneError, match=r"can't render .*scene.xml: .*[Nn]ot implemented"):
+        of.open(Settings())
+
+
 def test_a_renderer_of_your_own(tmp_path):
     of = Scene(write_scene(tmp_path / "ball", ball()), RENDERER)
     of.check(LimitSettings())

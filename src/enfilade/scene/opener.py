@@ -17,6 +17,7 @@ from typing import Any
 from enfilade.device import active
 from enfilade.errors import SceneError, SettingsError
 from enfilade.renderer import Renderer
+from enfilade.resource_limits import is_out_of_memory
 from enfilade.scene.blender.source import SUFFIXES
 from enfilade.scene.preflight import Preflight, preflight
 from enfilade.settings import LimitSettings, Settings, TraceSettings
@@ -107,6 +108,7 @@ class Scene:
             There is no such renderer.
         DeviceError
             No usable LLVM or CUDA.
+        MemoryError
         """
         options = {
             "max_depth": settings[TraceSettings].max_depth,
@@ -116,9 +118,15 @@ class Scene:
             opened: Renderer = _imported(self.renderer)(self.file, **options)
             return opened
         self._check_suffix()
+        from enfilade.scene.mitsuba.files import reason
         from enfilade.scene.mitsuba.renderer import MitsubaRenderer
 
-        return MitsubaRenderer(self.file, **options)
+        try:
+            return MitsubaRenderer(self.file, **options)
+        except RuntimeError as error:  # of Mitsuba, such as by a plugin that this variant lacks
+            if is_out_of_memory(str(error)):
+                raise MemoryError(f"too little memory to open {self.file}") from error
+            raise SceneError(f"Mitsuba can't render {self.file}: {reason(error)}") from error
 
     def to_json(self) -> dict[str, Any]:
         """The scene, fit for JSON; read back by :meth:`from_json`."""

@@ -101,16 +101,17 @@ def _main(scene: Path, tables: str, variant: str, parent: int) -> None:
     from enfilade.device import activate
 
     activate("gpu" if is_gpu else "cpu")
-    from enfilade.scene.mitsuba.files import check_scene
-    from enfilade.scene.mitsuba.renderer import MitsubaRenderer
+    import enfilade.scene.mitsuba.renderer  # noqa: F401  (before the limit: LLVM hangs if it can't be loaded)
+    from enfilade.renderer import why_inseparable
+    from enfilade.scene.opener import Scene
 
     if not is_gpu:  # CUDA maps the memory of the GPU into the address space
         limit_memory(settings[LimitSettings].preflight_mb)
     answer: dict[str, Any] = {"error": ""}
     try:
-        check_scene(scene, settings[LimitSettings])
-        renderer = MitsubaRenderer(scene, max_depth=settings[TraceSettings].max_depth)
-        answer |= asdict(Preflight(renderer.why_inseparable, renderer.ignored))
+        Scene(scene).check(settings[LimitSettings])
+        renderer: Any = Scene(scene).open(settings)
+        answer |= asdict(Preflight(why_inseparable(renderer), renderer.ignored))
     except SceneError as error:
         answer["error"] = str(error)
     except Exception as error:
@@ -118,8 +119,6 @@ def _main(scene: Path, tables: str, variant: str, parent: int) -> None:
         if is_out_of_memory(text):
             raise
         answer["error"] = f"{scene} was not loaded: {text}; this is a defect of enfilade: please report it"
-        if isinstance(error, RuntimeError):  # of Mitsuba
-            answer["error"] = f"Mitsuba can't render {scene}: {error}"
     os.write(out, json.dumps(answer).encode())
 
 
