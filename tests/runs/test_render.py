@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import shutil
+from functools import partial
 
 import pytest
 
@@ -23,8 +24,10 @@ from enfilade.monitor import Silence
 from enfilade.runs.executor import Workers
 from enfilade.runs.folder import RunFolder
 from enfilade.runs.job import Job, read_job
+from enfilade.runs.plan import plan
 from enfilade.runs.render import Shard, prepare, render, render_shard
 from enfilade.scene.opener import Scene
+from enfilade.scene.preflight import Preflight
 from enfilade.settings import (
     SECTIONS,
     LimitSettings,
@@ -238,6 +241,17 @@ def test_a_refused_run_leaves_nothing_behind(job, tmp_path, monkeypatch):
     assert not (tmp_path / "run").exists()
     prepare(job, tmp_path / "run")
     render(job, tmp_path / "run", Silence(), has_preflight=True)  # not again for a run that was begun
+
+
+@pytest.mark.parametrize("has_preflight", [False, True])
+def test_what_frames_will_not_show_is_told_once(tmp_path, monkeypatch, has_preflight):
+    job = toy_job(tmp_path)
+    (tmp_path / "ignored").write_text("there is fog")
+    monkeypatch.setattr(Scene, "preflight", lambda *_: Preflight(ignored=["there is fog"]))
+    for act in (lambda monitor, **how: render(job, tmp_path / "run", monitor, **how), partial(plan, job)):
+        monitor = Recorder()
+        act(monitor, has_preflight=has_preflight)
+        assert monitor.said.count("there is fog") == 1
 
 
 def test_the_video_is_described_before_it_is_encoded(tmp_path):

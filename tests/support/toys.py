@@ -124,7 +124,7 @@ class Recorder:
         self._after, self._act = after, act
 
     def progress(self, name: str, done: int, total: int) -> None:
-        assert 1 <= done <= total
+        assert 0 <= done <= total
         self.done.append(name)
         if len(self.done) == self._after:
             self._act()

@@ -28,7 +28,8 @@ class Wall:
         self.paths_in_flight = paths_in_flight
 
     def describe(self) -> SceneDescription:
-        return SceneDescription("wall", "none", ("wall",))
+        ignored = [file.read_text() for file in self.folder.glob("ignored")]
+        return SceneDescription("wall", "none", ("wall",), ignored=tuple(ignored))
 
     def surfaces(self, rays: Rays) -> Surfaces:
         distance = -rays.origin.z / rays.direction.z

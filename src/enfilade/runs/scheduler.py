@@ -144,11 +144,13 @@ def _check_progress(job: Job, again: Sequence[Task]) -> None:
 
 
 def _warn(job: Job, run: RunFolder, monitor: Monitor) -> None:
-    """Tell of black frames as soon as the whole path is analyzed, by this command or by several."""
+    """Tell of black frames, and of what no frame will show, as soon as the whole path is analyzed."""
     run.refresh()
-    is_analyzed = all(is_done(job, run, task) for task in analysis_tasks(len(job.path)))
-    if is_analyzed and (warning := analysis_of(job, run).warning):
-        monitor.message(warning)
+    if all(is_done(job, run, task) for task in analysis_tasks(len(job.path))):
+        line = run.line(ANALYSIS.name, job.path.numbers[0]) or {}
+        for note in (analysis_of(job, run).warning, *line.get("ignored", ())):
+            if note and note not in run.notes:  # of the preflight
+                monitor.message(note)
 
 
 def open_executor(job: Job, run: RunFolder, workers: Workers) -> Executor:

@@ -83,6 +83,7 @@ class Worker:
                 case ANALYSIS.name:
                     frames = range(task.frame, min(task.frame + ANALYZED_FRAMES, len(self._job.path)))
                     metadata = {"frames": [asdict(analyze(self._walk, frame)) for frame in frames]}
+                    metadata["ignored"] = self._walk.renderer.describe().ignored
                 case CLIPS.name:
                     files = [write_clip(self._run, self._job, task.frame)]
                 case VIDEO.name:

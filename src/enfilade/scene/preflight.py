@@ -29,7 +29,7 @@ class Preflight:
     why_inseparable : str
         See :attr:`enfilade.renderer.LobeRenderer.why_inseparable`; empty where it is not known.
     ignored : list of str
-        What the scene has and the frames will not show.
+        See :attr:`enfilade.renderer.SceneDescription.ignored`.
     """
 
     why_inseparable: str = ""
@@ -110,8 +110,8 @@ def _main(scene: Path, tables: str, variant: str, parent: int) -> None:
     answer: dict[str, Any] = {"error": ""}
     try:
         Scene(scene).check(settings[LimitSettings])
-        renderer: Any = Scene(scene).open(settings)
-        answer |= asdict(Preflight(why_inseparable(renderer), renderer.ignored))
+        renderer = Scene(scene).open(settings)
+        answer |= asdict(Preflight(why_inseparable(renderer), list(renderer.describe().ignored)))
     except SceneError as error:
         answer["error"] = str(error)
     except Exception as error:

@@ -88,6 +88,13 @@ class MitsubaRenderer:
         shadow_rays = ShadowRays(scene, pass_to_all=self._is_volumetric)
         self._transport = LightTransport(scene, self._lobes, self._continued_radiance, shadow_rays)
         self._shapes = Shapes(self._merged)
+        self._description = SceneDescription(
+            renderer=f"Mitsuba {mi.__version__}",
+            variant=self._device.variant,
+            shapes=self._shapes.names,
+            has_background=scene.environment() is not None,
+            ignored=tuple(ignored(scene, self._integrator)),
+        )
         self._surfaces = recorded(lambda rays: self._intersect(rays)[0], lambda: self.state)
         # Mitsuba builds the sampling table of an emitting mesh when it is first used. That must not happen
         # while a kernel is recorded.
@@ -95,12 +102,7 @@ class MitsubaRenderer:
 
     def describe(self) -> SceneDescription:
         """Description of the scene and the renderer."""
-        return SceneDescription(
-            renderer=f"Mitsuba {mi.__version__}",
-            variant=self._device.variant,
-            shapes=self._shapes.names,
-            has_background=self._scene.environment() is not None,
-        )
+        return self._description
 
     def surfaces(self, rays: Rays) -> Surfaces:
         """Find the first surface along each ray that is at least half opaque."""
@@ -127,11 +129,6 @@ class MitsubaRenderer:
             pixel_filter=pixel_filter,
             random=random,
         )
-
-    @property
-    def ignored(self) -> list[str]:
-        """See :attr:`enfilade.scene.preflight.Preflight.ignored`."""
-        return ignored(self._scene, self._integrator)
 
     @property
     def why_inseparable(self) -> str:
