@@ -255,15 +255,15 @@ class SceneDescription:
         Names of shapes 1, 2, ...
     has_background : bool
         Whether rays that hit no surface may see light; False only where all of them are black.
-    ignored : tuple of str
-        What the scene has and the frames will not show.
+    notes : tuple of str
+        What the scene has and the frames will not show, and warnings of the renderer.
     """
 
     renderer: str
     variant: str
     shapes: tuple[str, ...]
     has_background: bool = True
-    ignored: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 class Renderer(Protocol):

@@ -246,8 +246,8 @@ def test_a_refused_run_leaves_nothing_behind(job, tmp_path, monkeypatch):
 @pytest.mark.parametrize("has_preflight", [False, True])
 def test_what_frames_will_not_show_is_told_once(tmp_path, monkeypatch, has_preflight):
     job = toy_job(tmp_path)
-    (tmp_path / "ignored").write_text("there is fog")
-    monkeypatch.setattr(Scene, "preflight", lambda *_: Preflight(ignored=["there is fog"]))
+    (tmp_path / "notes").write_text("there is fog")
+    monkeypatch.setattr(Scene, "preflight", lambda *_: Preflight(notes=["there is fog"]))
     for act in (lambda monitor, **how: render(job, tmp_path / "run", monitor, **how), partial(plan, job)):
         monitor = Recorder()
         act(monitor, has_preflight=has_preflight)

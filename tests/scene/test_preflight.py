@@ -2,17 +2,20 @@
 
 import json
 import os
+import re
 import select
 import signal
 import subprocess
 import sys
 import time
 
+import mitsuba as mi
 import numpy as np
 import pytest
 from PIL import Image
 
 from enfilade.errors import SceneError
+from enfilade.scene.opener import Scene
 from enfilade.scene.preflight import Preflight, preflight
 from enfilade.settings import LimitSettings, Settings, TraceSettings
 
@@ -50,9 +53,29 @@ FOG = """<shape type="cube"><bsdf type="null"/><medium type="homogeneous" name="
     ],
 )
 def test_it_reports_what_frames_will_not_show(scene, body, words):
-    notes = checked(scene(body)).ignored
+    notes = checked(scene(body)).notes
     assert len(notes) == len(words)
     assert all(word in note for word, note in zip(words, notes, strict=True))
+
+
+def test_it_reports_warnings_of_mitsuba_and_leaves_its_log_as_it_was(scene):
+    image = '<texture type="bitmap" name="reflectance"><string name="filename" value="bright.pfm"/></texture>'
+    shape = f'<shape type="sphere"><bsdf type="diffuse">{image}</bsdf></shape>'
+    file = scene(f'{shape}{shape}<emitter type="constant"/>')
+    (file.parent / "bright.pfm").write_bytes(
+        b"PF\n8 4\n-1.0\n" + np.full((4, 8, 3), 2.0, np.float32).tobytes()
+    )
+    (note,) = checked(file).notes
+    assert re.search(r'^Mitsuba warns: .*"bright.pfm" contains pixels that exceed', note)
+
+    def log():
+        logger = mi.logger()
+        appenders = [logger.appender(i) for i in range(logger.appender_count())]
+        return logger.log_level(), logger.formatter(), appenders
+
+    before = log()
+    assert Scene(file).open(Settings()).describe().notes == (note,)
+    assert log() == before
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])

@@ -28,8 +28,8 @@ class Wall:
         self.paths_in_flight = paths_in_flight
 
     def describe(self) -> SceneDescription:
-        ignored = [file.read_text() for file in self.folder.glob("ignored")]
-        return SceneDescription("wall", "none", ("wall",), ignored=tuple(ignored))
+        notes = [file.read_text() for file in self.folder.glob("notes")]
+        return SceneDescription("wall", "none", ("wall",), notes=tuple(notes))
 
     def surfaces(self, rays: Rays) -> Surfaces:
         distance = -rays.origin.z / rays.direction.z

@@ -138,7 +138,7 @@ class Job:
         """
         found = self.scene.preflight(self.settings)
         self._check_lobes(found.why_inseparable)
-        return found.ignored
+        return found.notes
 
     def open_renderer(self) -> Renderer:
         """Load the scene.

@@ -132,7 +132,7 @@ def plan(job: Job, monitor: Monitor, *, has_preflight: bool = False) -> Plan:
     job.check()
     notes = job.preflight() if has_preflight else None
     method, path, renderer = job.opened_method(), job.path, job.open_renderer()
-    for note in renderer.describe().ignored if notes is None else notes:
+    for note in renderer.describe().notes if notes is None else notes:
         monitor.message(note)
     analysis = _analyzed(job, renderer, monitor)
     if analysis.warning:

@@ -148,7 +148,7 @@ def _warn(job: Job, run: RunFolder, monitor: Monitor) -> None:
     run.refresh()
     if all(is_done(job, run, task) for task in analysis_tasks(len(job.path))):
         line = run.line(ANALYSIS.name, job.path.numbers[0]) or {}
-        for note in (analysis_of(job, run).warning, *line.get("ignored", ())):
+        for note in (analysis_of(job, run).warning, *line.get("notes", ())):
             if note and note not in run.notes:  # of the preflight
                 monitor.message(note)
 

@@ -83,7 +83,7 @@ class Worker:
                 case ANALYSIS.name:
                     frames = range(task.frame, min(task.frame + ANALYZED_FRAMES, len(self._job.path)))
                     metadata = {"frames": [asdict(analyze(self._walk, frame)) for frame in frames]}
-                    metadata["ignored"] = self._walk.renderer.describe().ignored
+                    metadata["notes"] = self._walk.renderer.describe().notes
                 case CLIPS.name:
                     files = [write_clip(self._run, self._job, task.frame)]
                 case VIDEO.name:

@@ -28,12 +28,12 @@ class Preflight:
     ----------
     why_inseparable : str
         See :attr:`enfilade.renderer.LobeRenderer.why_inseparable`; empty where it is not known.
-    ignored : list of str
-        See :attr:`enfilade.renderer.SceneDescription.ignored`.
+    notes : list of str
+        See :attr:`enfilade.renderer.SceneDescription.notes`.
     """
 
     why_inseparable: str = ""
-    ignored: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
 
 def preflight(scene: Path, trace: TraceSettings, limits: LimitSettings, variant: str) -> Preflight:
@@ -111,7 +111,7 @@ def _main(scene: Path, tables: str, variant: str, parent: int) -> None:
     try:
         Scene(scene).check(settings[LimitSettings])
         renderer = Scene(scene).open(settings)
-        answer |= asdict(Preflight(why_inseparable(renderer), list(renderer.describe().ignored)))
+        answer |= asdict(Preflight(why_inseparable(renderer), list(renderer.describe().notes)))
     except SceneError as error:
         answer["error"] = str(error)
     except Exception as error:

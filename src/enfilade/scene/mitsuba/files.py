@@ -89,6 +89,42 @@ def reason(error: Exception) -> str:
 
 
 @contextmanager
+def collected_warnings() -> Iterator[list[str]]:
+    """Collect Mitsuba's warnings, each once, in place of printing them."""
+    untyped: Any = mi
+    logger = untyped.logger()
+    found: list[str] = []
+    level, formatter = logger.log_level(), logger.formatter()
+    appenders = [logger.appender(i) for i in range(logger.appender_count())]
+
+    class Message(mi.Formatter):
+        def format(self, level: Any, cname: str | None, fname: str, line: int, msg: str) -> str:
+            del level, cname, fname, line
+            return f"Mitsuba warns: {' '.join(msg.split())}"
+
+    class Collector(mi.Appender):
+        def append(self, level: Any, text: str) -> None:
+            if level == mi.LogLevel.Warn and text not in found:
+                found.append(text)
+
+        def log_progress(self, *_: Any) -> None:
+            pass
+
+    logger.clear_appenders()
+    logger.add_appender(Collector())
+    logger.set_formatter(Message())
+    logger.set_log_level(mi.LogLevel.Warn)
+    try:
+        yield found
+    finally:
+        logger.clear_appenders()
+        for appender in appenders:
+            logger.add_appender(appender)
+        logger.set_formatter(formatter)
+        logger.set_log_level(level)
+
+
+@contextmanager
 def _parsed(scene: Path) -> Iterator[tuple[Any, Any]]:
     """The parsed scene, and the file resolver with all folders in which its files are looked for."""
     _check_there(scene)
@@ -97,9 +133,10 @@ def _parsed(scene: Path) -> Iterator[tuple[Any, Any]]:
     resolver = mi.FileResolver(before)
     resolver.prepend(str(scene.resolve().parent))
     untyped.set_file_resolver(resolver)
-    mi.set_log_level(mi.LogLevel.Error)
     try:
-        yield mi.parser.parse_file(mi.parser.ParserConfig(PARSER_VARIANT), str(scene.resolve())), resolver
+        with collected_warnings():  # they come again when the scene is loaded
+            state = mi.parser.parse_file(mi.parser.ParserConfig(PARSER_VARIANT), str(scene.resolve()))
+        yield state, resolver
     except RuntimeError as error:
         raise SceneError(f"Mitsuba can't parse {scene}: {reason(error)}") from error
     except UnicodeDecodeError as error:

@@ -30,7 +30,6 @@ def load_scene(file: Path) -> Any:
     MemoryError
     """
     gc.collect()
-    mi.set_log_level(mi.LogLevel.Error)
     threads = dr.thread_count()
     if threads == 1:  # Mitsuba waits for the tasks that read an OpenEXR file without running any of them
         dr.set_thread_count(2)

@@ -36,6 +36,7 @@ from enfilade.renderer import (
     Surfaces,
 )
 from enfilade.scene.mitsuba.emitters import find_emitters, trace_photons
+from enfilade.scene.mitsuba.files import collected_warnings
 from enfilade.scene.mitsuba.integrators import (
     ignored,
     is_volumetric,
@@ -75,7 +76,8 @@ class MitsubaRenderer:
     def __init__(self, file: Path, *, max_depth: int = 0, paths_in_flight: int = 1 << 20) -> None:
         self._device = active()
         mi.set_variant(self._device.variant)
-        self._merged = merge_meshes(load_scene(file))
+        with collected_warnings() as warnings:
+            self._merged = merge_meshes(load_scene(file))
         self._scene = scene = self._merged.scene
         self._paths_in_flight = paths_in_flight
         self._integrator = scene_integrator(scene, max_depth)
@@ -93,7 +95,7 @@ class MitsubaRenderer:
             variant=self._device.variant,
             shapes=self._shapes.names,
             has_background=scene.environment() is not None,
-            ignored=tuple(ignored(scene, self._integrator)),
+            notes=(*ignored(scene, self._integrator), *warnings),
         )
         self._surfaces = recorded(lambda rays: self._intersect(rays)[0], lambda: self.state)
         # Mitsuba builds the sampling table of an emitting mesh when it is first used. That must not happen
