@@ -37,6 +37,8 @@ def test_it_reports_why_lobes_are_inseparable(scene):
 FOG = """<shape type="cube"><bsdf type="null"/><medium type="homogeneous" name="interior">
 <float name="sigma_t" value="1"/></medium></shape><emitter type="constant"/>"""
 
+NEAR = '<float name="near_clip" value="{}"/>'
+
 
 @pytest.mark.parametrize(
     ("body", "words"),
@@ -47,6 +49,12 @@ FOG = """<shape type="cube"><bsdf type="null"/><medium type="homogeneous" name="
             f"""<sensor type="thinlens"><float name="aperture_radius" value="0.1"/>
             <float name="focus_distance" value="2"/></sensor>{BALL}""",
             ["ThinLensCamera"],
+        ),
+        (f'<sensor type="perspective">{NEAR.format(0.03)}</sensor>{BALL}', []),
+        (f'<sensor type="perspective">{NEAR.format(0.04)}</sensor>{BALL}', ["of 0.04 to 10000 alone"]),
+        (
+            f'<sensor type="perspective"><float name="far_clip" value="3"/></sensor>{BALL}',
+            ["of 0.01 to 3 al"],
         ),
         (f'<integrator type="path"/>{FOG}', ["participating media"]),
         (f'<integrator type="volpath"/>{FOG}', []),

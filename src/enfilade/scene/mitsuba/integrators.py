@@ -6,6 +6,7 @@ import re
 from typing import Any
 
 import mitsuba as mi
+import numpy as np
 
 from enfilade.errors import SceneError
 from enfilade.renderer import MAX_PATH_DEPTH
@@ -15,6 +16,7 @@ PATH_TRACERS = {  # Mitsuba's classes that trace paths from the camera to their 
     "VolumetricPathIntegrator": "volpath",
     "VolpathMisIntegratorImpl": "volpathmis",
 }
+NEAR_SHARE = 0.01  # of the scene's diagonal: what is nearer than that is hardly ever in sight
 UNLIMITED = 2**31  # as Mitsuba prints a max_depth of -1
 
 
@@ -68,12 +70,22 @@ def why_inseparable(scene: Any, integrator: Any) -> str:
 
 
 def ignored(scene: Any, integrator: Any) -> list[str]:
-    """What a scene has and its pictures will not show: lenses and projections of its sensors, media."""
+    """What a scene has and frames will not show: lenses, projections and clipping of its sensors, media."""
+    diagonal = float(np.linalg.norm(scene.bbox().extents()))
     notes = [
         f"the scene's sensor is a {sensor.class_name()}: every frame is the perspective image of a pinhole"
         for sensor in scene.sensors()
         if sensor.class_name() != "PerspectiveCamera"
     ]
+    for sensor in scene.sensors():
+        if not isinstance(sensor, mi.ProjectiveCamera):
+            continue
+        near, far = sensor.near_clip(), sensor.far_clip()
+        if near > NEAR_SHARE * diagonal or far < diagonal:
+            notes.append(
+                f"the scene's sensor shows distances of {near:g} to {far:g} alone (near_clip, far_clip): "
+                f"frames show all of the scene, which measures {diagonal:.3g}"
+            )
     if not is_volumetric(integrator) and has_media(scene):
         notes.append(
             "the scene has participating media, which its integrator ignores: "
