@@ -80,7 +80,7 @@ def draw_walk(result: Values, scene: str, file: Path) -> Path:
 
 def _predictions(ax: Any, segments: Sequence[Values], limit: float) -> None:
     """Predictions before and after splitting, with pursuit and without."""
-    compared = [s for s in segments if s["middle"] is not None]
+    compared = [s for s in segments if None not in (s["middle"], s["percent_visible"])]
     before = [s for s in compared if s["depth"] == 0]
     after = [s for s in compared if not s["is_split"]]
     for key, eye, color, line in (

@@ -87,7 +87,7 @@ def predictions(segments: list[dict[str, Any]], limit: float) -> dict[str, Any]:
         ``unsplit_above_limit_still``: remaining segments above the limit without pursuit.
         ``remaining_above_limit``: remaining segments above the limit; 0, since splitting goes on.
     """
-    compared = [s for s in segments if s["middle"] is not None]
+    compared = [s for s in segments if None not in (s["middle"], s["percent_visible"])]
     initial = [s for s in compared if s["depth"] == 0]
     remaining = [s for s in compared if not s["is_split"]]
     split = [s for s in compared if s["is_split"]]

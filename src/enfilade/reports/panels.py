@@ -141,7 +141,8 @@ def _traced_panel(summary: Mapping[str, Any]) -> Panel:
 
 def _predictions_panel(segments: Sequence[Mapping[str, Any]], split_percent: float | None) -> Panel:
     """Predictions of the metric for the middles of segments, before and after segments are split (§4.3)."""
-    compared = sorted((s for s in segments if s["middle"] is not None), key=lambda s: s["middle"])
+    compared = [s for s in segments if None not in (s["middle"], s["percent_visible"])]
+    compared.sort(key=lambda s: s["middle"])
     chosen = {
         ("before split", "square"): [s for s in compared if s["depth"] == 0],
         ("after split", "circle"): [s for s in compared if not s["is_split"]],

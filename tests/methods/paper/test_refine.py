@@ -11,6 +11,7 @@ from enfilade.methods.paper.method import Paper
 from enfilade.methods.paper.refine import Refinement, SegmentResult, leaf_of
 from enfilade.records import Keyframe, Provenance
 from support.closed_room import opened_room, room_path
+from support.example_scenes import slide
 from support.in_memory import run_passes, walk_of
 from support.planted_wall import FRAMES, PlantedWall, planted_path
 
@@ -78,6 +79,18 @@ def test_noise_of_4_paths_is_no_difference():
     for seed in range(3):
         (result,) = refined("none", spp=4, seed=seed)
         assert result.percent_visible < 5.0
+
+
+def test_segments_whose_keyframes_show_nothing_of_the_middle_are_split():
+    path = slide(5, step=20.0, size=SIZE)
+    walk = walk_of(path, PlantedWall("none", noise=0.0))
+    results = Refinement(walk).refine(
+        Segment(0, 4), lambda frame: Keyframe(walk.view(frame).geometry, trace_keyframe(walk, frame))
+    )
+    assert {(r.first, r.last) for r in results if r.is_split} == {(0, 4), (0, 2), (2, 4)}
+    assert all(r.percent_visible is None for r in results)
+    table = results[0].to_table((1, 2, 3, 4, 5))
+    assert SegmentResult.from_table(table, (1, 2, 3, 4, 5)) == results[0]
 
 
 def test_results_survive_a_table_of_frame_numbers():

@@ -40,7 +40,7 @@ class Paper(Method):
     """The published method."""
 
     name = "paper"
-    revision = 6
+    revision = 7
     settings = (
         TraceSettings,
         SamplingSettings,

@@ -20,6 +20,7 @@ from enfilade.records import F32, Keyframe, Mask, Warped
 from enfilade.settings import AntialiasSettings, MaskSettings, MetricSettings, WarpSettings
 
 MIN_COMPARED = 0.05  # of the image: fewer unmasked pixels are not representative of a segment
+MOST_DISOCCLUDED = 0.5  # of the image: with more disoccluded pixels to trace a keyframe costs little more
 FFT_THREADS = 2
 
 
@@ -37,10 +38,11 @@ class SegmentResult:
         The frame that was compared; None for segments without in-betweens.
     reusable : frozenset of int
         Specular shapes whose reuse can't be seen; all others must be traced in the whole segment.
-    percent_visible, percent_visible_no_pursuit : float
-        Unmasked pixels above 1 JND, percent, with and without smooth pursuit.
+    percent_visible, percent_visible_no_pursuit : float or None
+        Unmasked pixels above 1 JND, percent, with and without smooth pursuit; None where too few pixels can
+        be compared.
     is_split : bool
-        More of them than the settings allow.
+        More of them than the settings allow, or most pixels are disoccluded.
     """
 
     first: int
@@ -48,8 +50,8 @@ class SegmentResult:
     depth: int
     middle: int | None
     reusable: frozenset[int] = frozenset()
-    percent_visible: float = 0.0
-    percent_visible_no_pursuit: float = 0.0
+    percent_visible: float | None = None
+    percent_visible_no_pursuit: float | None = None
     is_split: bool = False
 
     @property
@@ -129,18 +131,19 @@ class Refinement:
         tolerance = walk.settings[WarpSettings].depth_tolerance
         is_outline = outline_pixels(view.geometry, tolerance)
         is_inside = ~is_outline
-        is_compared = is_inside.copy()
-        for one in warped:
-            is_compared &= agrees(one, view.geometry, is_outline, tolerance)
+        agreed = [agrees(one, view.geometry, is_outline, tolerance) for one in warped]
+        is_compared = is_inside & agreed[0] & agreed[1]
         jnd, jnd_no_pursuit = self._differences(view, warped, is_compared)
 
         # Mask the pixels that will be traced: slow ones, and specular shapes whose reuse is visible.
         reusable = reusable_specular_shapes(jnd, is_compared, is_inside, view.geometry, masks)
         is_slow = slow_pixels(view.speed_deg_s, masks)
-        unmasked = is_compared & ~is_slow & ~specular_pixels(view.geometry, reusable)
+        is_masked = is_slow | specular_pixels(view.geometry, reusable)
+        unmasked = is_compared & ~is_masked
         if (is_compared & ~unmasked).any() and unmasked.mean() >= MIN_COMPARED:
             # Compare again without them: the metric's filters spread a difference over its neighbourhood.
             jnd, jnd_no_pursuit = self._differences(view, warped, unmasked)
+        is_disoccluded = ~is_masked & ~agreed[0] & ~agreed[1]
         percent, percent_no_pursuit = (_percent_visible(j, unmasked) for j in (jnd, jnd_no_pursuit))
         return SegmentResult(
             *ends,
@@ -148,7 +151,7 @@ class Refinement:
             reusable=reusable,
             percent_visible=percent,
             percent_visible_no_pursuit=percent_no_pursuit,
-            is_split=percent > masks.split_percent,
+            is_split=(percent or 0.0) > masks.split_percent or is_disoccluded.mean() > MOST_DISOCCLUDED,
         )
 
     def _differences(self, view: View, warped: tuple[Warped, Warped], is_compared: Mask) -> tuple[F32, F32]:
@@ -169,7 +172,7 @@ class Refinement:
         return jnd, jnd_no_pursuit
 
 
-def _percent_visible(jnd: F32, where: Mask) -> float:
+def _percent_visible(jnd: F32, where: Mask) -> float | None:
     if where.mean() < MIN_COMPARED:
-        return 0.0
+        return None
     return 100.0 * float((jnd[where] > 1.0).mean())
