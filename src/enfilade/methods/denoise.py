@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import functools
+import os
 from importlib.metadata import version
 from typing import Any
 
+import drjit as dr
 import numpy as np
 
 from enfilade.arrays import release_memory
@@ -31,6 +33,7 @@ def denoise(color: F32, albedo: F32, normal: F32, *, quality: str = "high") -> F
     Returns
     -------
     (H, W, 3) float32
+        The same for any number of threads, which is that of Dr.Jit.
 
     Notes
     -----
@@ -41,7 +44,7 @@ def denoise(color: F32, albedo: F32, normal: F32, *, quality: str = "high") -> F
 
     inputs = {name: np.ascontiguousarray(image, np.float32) for name, image in images.items()}
     output = np.empty_like(inputs["color"])
-    device = _device()
+    device = _device(dr.thread_count())
     release_memory()  # the network takes its own
     with pyoidn.Filter(device, pyoidn.OIDN_FILTER_TYPE_RT) as network:
         for name, image in {**inputs, "output": output}.items():
@@ -57,11 +60,14 @@ def denoise(color: F32, albedo: F32, normal: F32, *, quality: str = "high") -> F
     return output
 
 
-@functools.cache
-def _device() -> Any:
+@functools.lru_cache(maxsize=1)
+def _device(threads: int) -> Any:
     import pyoidn
 
     device = pyoidn.Device()
+    if threads < len(os.sched_getaffinity(0)):
+        device.set_int("numThreads", threads)
+        device.set_bool("setAffinity", False)  # several processes would share the first cores
     device.commit()
     return device
 

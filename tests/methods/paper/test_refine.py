@@ -2,10 +2,12 @@
 
 from functools import cache
 
+import drjit as dr
 import numpy as np
 import pytest
 
 from enfilade.camera.path import Segment
+from enfilade.methods.paper import refine
 from enfilade.methods.paper.keyframe import trace_keyframe
 from enfilade.methods.paper.method import Paper
 from enfilade.methods.paper.refine import Refinement, SegmentResult, leaf_of
@@ -91,6 +93,15 @@ def test_segments_whose_keyframes_show_nothing_of_the_middle_are_split():
     assert all(r.percent_visible is None for r in results)
     table = results[0].to_table((1, 2, 3, 4, 5))
     assert SegmentResult.from_table(table, (1, 2, 3, 4, 5)) == results[0]
+
+
+def test_no_more_threads_than_dr_jit_has(monkeypatch):
+    walk, threads = walk_of(room_path(3, SIZE), PlantedWall("none", noise=0.0)), []
+    monkeypatch.setattr(refine, "HalvesAqm", lambda *_, workers, **__: threads.append(workers))
+    for count in (1, 4):
+        dr.set_thread_count(count)
+        Refinement(walk)
+    assert threads == [1, 2]
 
 
 def test_results_survive_a_table_of_frame_numbers():

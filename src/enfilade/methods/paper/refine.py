@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+
 from enfilade.camera.path import Segment
 from enfilade.gbuffer import View
 from enfilade.methods.paper.composite import agrees
@@ -21,7 +23,7 @@ from enfilade.settings import AntialiasSettings, MaskSettings, MetricSettings, W
 
 MIN_COMPARED = 0.05  # of the image: fewer unmasked pixels are not representative of a segment
 MOST_DISOCCLUDED = 0.5  # of the image: with more disoccluded pixels to trace a keyframe costs little more
-FFT_THREADS = 2
+FFT_THREADS = 2  # at most
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,7 @@ class Refinement:
     def __init__(self, walk: Walkthrough) -> None:
         self._walk = walk
         slope = walk.settings[MetricSettings].mask_slope
-        self._metric = HalvesAqm(walk.viewing, mask_slope=slope, workers=FFT_THREADS)
+        self._metric = HalvesAqm(walk.viewing, mask_slope=slope, workers=min(FFT_THREADS, dr.thread_count()))
 
     def refine(self, initial: Segment, keyframe: Callable[[int], Keyframe]) -> list[SegmentResult]:
         """Compare a segment, and its halves where it is split.
