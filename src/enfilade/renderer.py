@@ -101,7 +101,7 @@ class Surfaces:
     normal : Array3f
         Shading normal in world space, unit length, in the hemisphere of the ray's origin.
     albedo : Array3f
-        Diffuse reflectance in the direction of the ray, including a coat, 0..1.
+        Diffuse reflectance of light along the normal towards the ray's origin, including a coat, 0..1.
     shape_index : UInt
         Index of the shape, from 1.
     surface : UInt

@@ -16,7 +16,9 @@ Quantity = TypeVar("Quantity", float, npt.NDArray[np.float32], npt.NDArray[np.fl
 
 @dataclass(frozen=True)
 class Viewing:
-    """Viewing conditions: screen, image and distance of the eye; the defaults are the paper's (§6).
+    """Viewing conditions: screen, image and distance of the eye.
+
+    The defaults are the paper's (§6), but for the persistence: its tube flashed, for about 0.05.
 
     Angles are those at the centre of the screen, looked at straight on; towards the corners of a
     screen that is near, a pixel covers a smaller angle, which is left out.
