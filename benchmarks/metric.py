@@ -16,7 +16,7 @@ from pathlib import Path
 
 SIZES = ((640, 480), (1920, 1080), (3840, 2160))
 MODES = ("paper", "modern")
-CASES = ("still", "moving", "moving and noisy", "sequence")
+CASES = ("still", "moving", "sequence")
 KIB_PER_MIB = 1024
 
 
@@ -35,8 +35,6 @@ def measure(width: int, height: int, mode: str, case: str, repeats: int) -> dict
     if case != "still":
         ramp = np.linspace(-20.0, 20.0, width, dtype=np.float32)
         maps["velocity"] = np.stack(np.broadcast_arrays(ramp, np.float32([[1.0]] * height)), -1)
-    if case == "moving and noisy":
-        maps["noise_variance"] = np.full_like(reference, 4.0)
 
     started = time.process_time()
     viewing = Viewing(640, 480).cropped(width, height)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +18,8 @@ import numpy as np
 
 from enfilade.errors import SettingsError
 from enfilade.methods.analysis import Analysis, analyze
-from enfilade.methods.paper.convolve import SIGMAS
 from enfilade.methods.paper.keyframe import MIN_SPP
 from enfilade.methods.paper.masks import slow_pixels
-from enfilade.methods.paper.support import spatial_support_px
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.monitor import Monitor
 from enfilade.records import F32, Mask
@@ -79,7 +78,7 @@ def calibrate(
     """Find the velocity threshold of a scene.
 
     Pixels of mirroring, transparent and glossy surfaces are left out; another rule applies to them (§4.3).
-    Differences within the Monte Carlo noise are discounted.
+    All frames are rendered twice, with independent noise, and what both halves share is compared.
 
     Parameters
     ----------
@@ -191,35 +190,27 @@ def _compare(windows: Windows, frame: int, counts: dict[float, _Count], classes:
     settings = windows.walk.settings[AntialiasSettings]
     speed, velocity = view.speed_deg_s, view.velocity_deg_s
     valid = view.geometry.is_hit & ~view.geometry.is_specular
-    # Noise of both, without temporal averaging: warped pixels carry the same noise in every frame.
-    support = spatial_support_px(speed, windows.walk.viewing.pixels_per_degree, settings)
-    noise = {
-        "noise": windows.traced(frame).variance + windows.reused(frame).variance,
-        "noise_blur_px": support / np.float32(SIGMAS),
-    }
+    halves = windows, windows.second_half
 
     def is_slow(at: int, threshold: float) -> Mask:
         return slow_pixels(windows.view(at).speed_deg_s, MaskSettings(slow_deg_s=threshold))
 
-    def filtered(threshold: float) -> F32:
-        def color(at: int) -> F32:
-            return composite_by_velocity(
-                windows.traced(at).color, windows.reused(at).color, is_slow(at, threshold)
-            )
+    def filtered(threshold: float) -> list[F32]:
+        def color(half: Windows, at: int) -> F32:
+            return composite_by_velocity(half.traced(at).color, half.reused(at).color, is_slow(at, threshold))
 
-        return windows.antialiased(frame, settings, color)
+        return [half.antialiased(frame, settings, partial(color, half)) for half in halves]
 
-    rt = windows.antialiased(frame, settings)
-    ibr = windows.antialiased(frame, settings, lambda at: windows.reused(at).color)
-    is_visible = valid & (viewer.paper(ibr, rt, velocity, valid=valid, **noise) > VISIBLE_JND)
+    rt, ibr = [half.antialiased(frame, settings) for half in halves], filtered(0.0)
+    is_visible = valid & (viewer.halves(ibr, rt, velocity, valid=valid) > VISIBLE_JND)
     classes += [np.histogram(speed[where], CLASSES_DEG_S)[0] for where in (valid, is_visible)]
     previous_counts: list[int] = []
     for threshold, count in counts.items():
         slow = [int(is_slow(at, threshold).sum()) for at in windows.around(frame, settings)]
         if slow != previous_counts:  # otherwise the pixels are those of the previous threshold
             previous_counts, c = slow, filtered(threshold)
-            against_traced = viewer.paper(c, rt, velocity, valid=valid, **noise)
-            against_reused = viewer.paper(ibr, c, velocity, valid=valid, **noise)
+            against_traced = viewer.halves(c, rt, velocity, valid=valid)
+            against_reused = viewer.halves(ibr, c, velocity, valid=valid)
         reused = valid & ~is_slow(frame, threshold)
         count.pixels += int(valid.sum())
         count.traced += int((valid & ~reused).sum())

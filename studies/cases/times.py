@@ -8,6 +8,7 @@ load are compared by the cost of a path.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -111,7 +112,8 @@ class _Quality:
     """Scores of the central crop of frames against their references."""
 
     def __init__(self, case: Case) -> None:
-        self._case, self._walk, self._reference_walk = case, case.walk, reseeded(case.walk)
+        self._case, self._walk, second = case, case.walk, reseeded(case.walk)
+        self._reference_walks = second, reseeded(second)
         path = case.walk.path
         self.crop = central_crop((path.width, path.height), *case.extent.crop)
         self._is_in_crop = np.zeros((path.height, path.width), np.bool_)
@@ -130,11 +132,16 @@ class _Quality:
 
     def _scores(self, frame: int, color: F32) -> Scores:
         stem = self._case.folder / "crops" / f"{self._walk.path.numbers[frame]:04d}"
-        spp = self._case.extent.reference_spp
-        reference = load_or_render(stem, lambda: self._traced(self._reference_walk, frame, spp))
+        spp = self._case.extent.reference_spp // 2
+        halves = [
+            load_or_render(
+                stem.with_name(f"{stem.name}-{half}"), partial(self._traced, walk, frame, spp)
+            ).color
+            for half, walk in enumerate(self._reference_walks, 1)
+        ]
         velocity = self._cropped(self._walk.view(frame).velocity_deg_s)
         # The noise of the reference is not an error of the test.
-        jnd = self._viewer.paper(color, reference.color, velocity, noise=reference.variance)
+        jnd = self._viewer.halves((color, color), halves, velocity)
         return scores_in(jnd, np.ones(jnd.shape, np.bool_))
 
     def _traced(self, walk: Walkthrough, frame: int, spp: int) -> Shading:

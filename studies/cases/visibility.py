@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from enfilade.kernels.tone import display_luminance
-from enfilade.metric import Aqm
+from enfilade.metric import Aqm, HalvesAqm, LuminanceHalves
 from enfilade.metric.pooling import POOLING_EXPONENT
 from enfilade.records import F32, Mask
 from enfilade.settings import MetricSettings, Settings, ViewingSettings
@@ -51,8 +52,6 @@ class Viewer:
         velocity_deg_s: F32 | None,
         *,
         valid: Mask | None = None,
-        noise: F32 | None = None,
-        noise_blur_px: F32 | None = None,
     ) -> F32:
         """JND map by the paper's mode, the worse of pursuit and the eye at rest (§3.3).
 
@@ -64,22 +63,21 @@ class Viewer:
             None: compared as stills.
         valid : (H, W) bool, optional
             Pixels to compare.
-        noise : (H, W) float32, optional
-            Variance of the noise of the difference, linear luminance, which is discounted.
-        noise_blur_px : (H, W) float32, optional
-            Standard deviation of the spatial filter that was applied to the noise, pixels.
         """
-        # Exposure and display are linear up to the clipping.
-        slope = 2.0 ** self.settings[ViewingSettings].exposure_ev
-        slope *= self.viewing.peak_cd_m2 - self.viewing.black_cd_m2
-        return self._paper.compare(
-            self.luminance(test),
-            self.luminance(reference),
-            velocity=velocity_deg_s,
-            valid=valid,
-            noise_variance=None if noise is None else (noise * slope**2).astype(np.float32),
-            noise_blur_px=noise_blur_px,
-        ).jnd
+        images = self.luminance(test), self.luminance(reference)
+        return self._paper.compare(*images, velocity=velocity_deg_s, valid=valid).jnd
+
+    def halves(
+        self,
+        test: Sequence[F32],
+        reference: Sequence[F32],
+        velocity_deg_s: F32 | None,
+        *,
+        valid: Mask | None = None,
+    ) -> F32:
+        """JND map of what two halves with independent noise share, as in a run; the arguments of `paper`."""
+        images = [LuminanceHalves(*map(self.luminance, of)) for of in (test, reference)]
+        return self._halves.compare(*images, velocity=velocity_deg_s, valid=valid).jnd
 
     def modern(self, test: F32, reference: F32, velocity_deg_s: F32 | None) -> F32:
         """JND map by the modern mode, of single frames (no flicker)."""
@@ -89,6 +87,10 @@ class Viewer:
     @cached_property
     def _paper(self) -> Aqm:
         return Aqm.paper(self.viewing, mask_slope=self.settings[MetricSettings].mask_slope)
+
+    @cached_property
+    def _halves(self) -> HalvesAqm:
+        return HalvesAqm(self.viewing, mask_slope=self.settings[MetricSettings].mask_slope)
 
     @cached_property
     def _modern(self) -> Aqm:

@@ -6,6 +6,7 @@ Frames are sampled at pixels' centres, as in the paper (§5.2); the filter antia
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,7 @@ from enfilade.methods.paper.temporal_filter import Slice, filter_along_flow
 from enfilade.methods.paper.warp import warped_pair
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.monitor import Monitor
-from enfilade.records import F32, Geometry, Halves, Keyframe, Mask, Shading
+from enfilade.records import F32, Geometry, Halves, Keyframe, Shading
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.settings import AntialiasSettings, SamplingSettings, TraceSettings, WarpSettings
 from studies.cases.virtual_images import reflected_geometry
@@ -67,6 +68,18 @@ class Windows:
         self._images: LruCache[tuple[str, int], Shading] = LruCache(CACHED_IMAGES)
         self._views: LruCache[int, View] = LruCache(CACHED_VIEWS)
 
+    @cached_property
+    def second_half(self) -> Windows:
+        """The same frames, traced with other random numbers."""
+        return Windows(
+            self._reference_walk,
+            self.analysis,
+            self.monitor,
+            probes=len(self.probes),
+            reference_spp=self._reference_spp,
+            folder=self._folder and self._folder / "second half",
+        )
+
     def around(self, frame: int, settings: AntialiasSettings) -> range:
         """Frames of the same shot that the filter may use."""
         reach = max(settings.frames, settings.slow_frames) // 2
@@ -102,8 +115,7 @@ class Windows:
     def reused(self, frame: int) -> Shading:
         """A frame composited from its keyframes, with traced disocclusions (I_ibr of Fig. 9).
 
-        The keyframes are the initial ones, without splits, and not denoised. The variance is the warped
-        density of the noise (:mod:`enfilade.metric.noise`).
+        The keyframes are the initial ones, without splits, and not denoised. The variance is not known.
         """
         segments = (s for shot in self.analysis.segments() for s in shot)
         segment = next((s for s in segments if frame in s.inbetweens), None)
@@ -150,26 +162,19 @@ class Windows:
         )
 
     def _composited(self, segment: Segment, frame: int) -> Shading:
-        color, is_disoccluded = self._warped(segment, frame, lambda of: of.color)
-        density, _ = self._warped(segment, frame, lambda of: np.repeat(of.variance[..., None], 3, axis=2))
-        variance, traced = np.ascontiguousarray(density[..., 0]), self.traced(frame)
-        color[is_disoccluded] = traced.color[is_disoccluded]
-        variance[is_disoccluded] = traced.variance[is_disoccluded]
-        return Shading(color, variance)
-
-    def _warped(self, segment: Segment, frame: int, values: Callable[[Shading], F32]) -> tuple[F32, Mask]:
-        """Values of both keyframes, composited at a frame, and disoccluded pixels."""
-        images = [values(self.traced(at)) for at in (segment.first, segment.last)]
+        images = [self.traced(at).color for at in (segment.first, segment.last)]
         first, last = (
             Keyframe(self.geometry(at), Halves(image, image))
             for at, image in zip((segment.first, segment.last), images, strict=True)
         )
-        return composite(
+        color, is_disoccluded = composite(
             *warped_pair(self.walk, first, last, frame),
             self.geometry(frame),
             progress=self.walk.path.progress(segment, frame),
             settings=self.walk.settings[WarpSettings],
         )
+        color[is_disoccluded] = self.traced(frame).color[is_disoccluded]
+        return Shading(color, np.zeros(color.shape[:2], np.float32))
 
     def _cached(self, kind: str, frame: int, make: Callable[[], Shading]) -> Shading:
         if self._folder is None:

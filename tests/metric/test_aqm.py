@@ -166,7 +166,7 @@ def test_bad_luminance_is_refused_by_place(paper, textured, value, word):
         ("velocity", np.zeros((128, 160), np.float32), "shape"),
         ("velocity", np.full((128, 160, 2), np.nan, np.float32), "not finite"),
         ("valid", np.zeros((128, 160), np.uint8), "uint8"),
-        ("noise_variance", np.full((128, 160), -1, np.float32), "negative"),
+        ("test", np.full((128, 160), -1, np.float32), "negative"),
         ("change", np.zeros((128, 160), np.float32), "paper's mode"),
     ],
 )

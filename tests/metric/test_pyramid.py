@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from enfilade.metric.pyramid import Pyramid, double, halve, halve_periodic, halved_shape
+from enfilade.metric.pyramid import Pyramid, double, halve, halved_shape
 
 SHAPES = [(1, 1), (1, 8), (2, 3), (7, 16), (12, 33)]
 
@@ -27,12 +27,3 @@ def test_double_is_exact_on_planes(shape):
     coarse = (2.0 * rows[:, None] - 6.0 * columns).astype(np.float32)
     expected = np.arange(shape[0])[:, None] - 3.0 * np.arange(shape[1])
     np.testing.assert_allclose(double(coarse, shape), expected, atol=1e-4)
-
-
-def test_periodic_halving_keeps_the_mean():
-    fine = np.random.default_rng(1).random((16, 24)).astype(np.float32)
-    coarse = halve_periodic(fine)
-    assert coarse.shape == (8, 12)
-    assert coarse.mean() == pytest.approx(fine.mean(), rel=1e-5)
-    around = np.roll(fine, (1, 1), (0, 1))[:3, :3].astype(float)
-    assert coarse[0, 0] == pytest.approx((around * np.outer([1, 2, 1], [1, 2, 1])).sum() / 16)

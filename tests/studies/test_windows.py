@@ -9,7 +9,7 @@ from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry, image_flow
 from enfilade.records import SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
-from enfilade.settings import MetricSettings
+from enfilade.settings import MetricSettings, TraceSettings
 from studies.cases.supports import uniform
 from studies.cases.virtual_images import VIRTUAL, mirror_pixels, reflected_geometry
 from studies.cases.visibility import Viewer, score_in, visible_percent
@@ -92,7 +92,10 @@ def test_traced_frames_are_kept_and_read_again(tmp_path):
     first = windows.traced(2).color
     assert len(list(tmp_path.rglob("*.exr"))) == 1
     np.testing.assert_array_equal(windows_of(room(), 8, folder=tmp_path).traced(2).color, first)
-    assert windows.reused(2).variance.max() > 0.0
+    halves = windows, windows.second_half
+    assert len({half.walk.settings[TraceSettings].seed for half in halves}) == 2
+    windows.second_half.traced(2)
+    assert len(list(tmp_path.rglob("second half/**/*.exr"))) == 1
     assert np.abs(windows.reference(2).color - first).max() > 0.0  # other random numbers, another filter
 
 
@@ -105,13 +108,13 @@ def test_scores_of_regions_of_a_map():
     assert score_in(jnd, nowhere) is visible_percent(jnd, nowhere) is None
 
 
-def test_declared_noise_does_not_count_and_the_slope_of_masking_does():
+def test_noise_of_halves_does_not_count_and_the_slope_of_masking_does():
     walk, viewer, reference = plain().walk, plain().viewer, plain().traced(5).color
-    noise = np.random.default_rng(1).normal(0.0, 0.05, reference.shape[:2]).astype(np.float32)
-    test = np.maximum(reference + noise[..., None], 0.0)
-    declared = viewer.paper(test, reference, None, noise=np.full(noise.shape, 0.05**2, np.float32))
+    noise = np.random.default_rng(1).normal(0.0, 0.05, (2, *reference.shape[:2], 1)).astype(np.float32)
+    tests = np.maximum(reference + noise, 0.0)
+    test = tests[0]
     assert (viewer.paper(test, reference, None) > 1.0).mean() > 0.3
-    assert (declared > 1.0).mean() < 0.05
+    assert (viewer.halves(tests, (reference, reference), None) > 1.0).mean() < 0.05
     steep, flat = (
         Viewer(walk.viewing, walk.settings.replace(MetricSettings, mask_slope=slope)) for slope in (1.0, 0.0)
     )

@@ -102,8 +102,6 @@ class Aqm:
         *,
         velocity: F32 | None = None,
         valid: Mask | None = None,
-        noise_variance: F32 | None = None,
-        noise_blur_px: F32 | None = None,
         change: F32 | None = None,
     ) -> Comparison:
         """Predict the visible differences between two images, and their probabilities of detection.
@@ -118,13 +116,6 @@ class Aqm:
             None: nothing moves.
         valid : (H, W) bool, optional
             Pixels to compare. Others may hold any value; they are filled from the other image.
-        noise_variance : (H, W) float32, optional
-            Variance of the Monte Carlo noise in test - reference, (cd/m2)^2: the sum of the two images'
-            variances when their samples are independent. Differences that it explains are not counted
-            (`metric.noise`).
-        noise_blur_px : (H, W) float32, optional
-            Standard deviation of the Gaussian that has filtered both images since the variance was
-            estimated, pixels. None: none.
         change : (H, W) float32, optional
             Change of test - reference since the last frame, at the same point of the same surface,
             cd/m2 (`metric.transient`); 0 where not valid. None: none. The paper's mode takes none.
@@ -142,10 +133,6 @@ class Aqm:
         """
         shape = self.viewing.height_px, self.viewing.width_px
         check_pair(shape, test, reference, velocity, valid)
-        if noise_variance is not None:
-            check_map("noise_variance", noise_variance, shape, valid)
-        if noise_blur_px is not None:
-            check_map("noise_blur_px", noise_blur_px, shape, None)
         if change is not None:
             check_map("change", change, shape, None, is_signed=True)
             if not self.has_transient:
@@ -155,12 +142,6 @@ class Aqm:
             *fill_undefined(test, reference, is_valid),
             valid=is_valid,
             velocity=None if velocity is None else coarse_velocity(velocity, is_valid),
-            noise_variance=_masked(noise_variance, is_valid),
-            noise_blur_px=noise_blur_px,
             change=change,
         )
         return self._metric.compare(pair, self.pursuit.hypotheses)
-
-
-def _masked(values: F32 | None, valid: Mask) -> F32 | None:
-    return None if values is None else np.where(valid, values, np.float32(0.0))

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 import scipy.fft
 
 from enfilade.metric.cortex import OVERSAMPLING, Band, Complex64, CortexTransform, Tilt, bands
-from enfilade.metric.noise import NOISE_SIGMAS, ChannelNoise, NoiseFilters
 from enfilade.metric.pyramid import halved_shape
 from enfilade.records import F32, Mask
 from enfilade.viewing import Viewing
@@ -26,7 +24,7 @@ class Channel:
     reference, difference
         Of the reference, and of test - reference.
     counted
-        The part of `difference` that noise does not explain, without the uniform part.
+        The difference without its uniform part.
     uniform
         `uniform_part` of the difference; None but in the base.
     """
@@ -97,9 +95,7 @@ class ChannelBank:
         start = self._margin_px // band.reduction
         return channels[..., start : start + height, start : start + width]
 
-    def channels(
-        self, spectra: Complex64, band: Band, valid: Mask, noise: ChannelNoise | None = None
-    ) -> Iterator[Channel]:
+    def channels(self, spectra: Complex64, band: Band, valid: Mask) -> Iterator[Channel]:
         """Channels of a band, in the order of its orientations.
 
         Parameters
@@ -109,8 +105,6 @@ class ChannelBank:
         band : Band
         valid : (H, W) bool
             Pixels to compare.
-        noise : ChannelNoise, optional
-            In the difference, of which the part above NOISE_SIGMAS standard deviations is counted.
         """
         ring = self.cortex.ring(spectra, band)
         for orientation in band.orientations:
@@ -119,20 +113,7 @@ class ChannelBank:
             if band.is_base:
                 uniform = uniform_part(difference, valid[:: band.reduction, :: band.reduction])
                 counted = difference - uniform
-            if noise is not None:
-                explained = np.float32(NOISE_SIGMAS) * self.crop(noise.deviation(band, orientation), band)
-                counted = counted - np.clip(counted, -explained, explained)
             yield Channel(reference, difference, counted, uniform)
-
-    def noise(self, variance: F32, blur_px: F32 | None) -> ChannelNoise:
-        """Noise of the channels, from its variance in the difference of the transformed images, (H, W)."""
-        return ChannelNoise(
-            self._noise_filters, self.pad(variance), None if blur_px is None else self.pad(blur_px)
-        )
-
-    @cached_property
-    def _noise_filters(self) -> NoiseFilters:
-        return NoiseFilters(self.cortex)
 
     def ring(self, spectrum: Complex64, band: Band) -> F32:
         """All orientations of a band together, (...) complex64 -> (h, w) float32."""

@@ -23,7 +23,7 @@ class Pair:
         Pixels to compare.
     velocity : (2, h, w) float32 or None
         Image velocity at every second pixel, deg/s; None where nothing moves.
-    noise_variance, noise_blur_px, change : (H, W) float32 or None
+    change : (H, W) float32 or None
         As in `Aqm.compare`.
     """
 
@@ -31,8 +31,6 @@ class Pair:
     reference: F32
     valid: Mask
     velocity: F32 | None
-    noise_variance: F32 | None
-    noise_blur_px: F32 | None
     change: F32 | None
 
 

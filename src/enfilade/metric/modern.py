@@ -36,12 +36,11 @@ class ModernMetric:
     2. Cortex transform (Watson 1987, Daly 1993), the CSF within each band included: `channels`, `cortex`.
     3. Retinal velocity (Eq. 5), and the smear of held frames: `eye`.
     4. castleCSF by luminance and velocity (Ashraf et al. 2024): `castlecsf`, `sensitivity`.
-    5. Differences that Monte Carlo noise explains are not counted: `noise`.
-    6. Contrast energy integrated over an aperture (Watson and Ahumada 2005): `aperture`.
-    7. Sensitivity corrected for the direction of motion within a channel: `direction`.
-    8. Masking by a transducer, over orientations and bands (Legge and Foley 1980, Foley 1994): `transducer`.
-    9. Errors that change from frame to frame, by the transient channel of castleCSF: `transient`.
-    10. Pooling over channels and probability of detection (§6): `pooling`, `comparison`.
+    5. Contrast energy integrated over an aperture (Watson and Ahumada 2005): `aperture`.
+    6. Sensitivity corrected for the direction of motion within a channel: `direction`.
+    7. Masking by a transducer, over orientations and bands (Legge and Foley 1980, Foley 1994): `transducer`.
+    8. Errors that change from frame to frame, by the transient channel of castleCSF: `transient`.
+    9. Pooling over channels and probability of detection (§6): `pooling`, `comparison`.
 
     Parameters
     ----------
@@ -111,9 +110,6 @@ class ModernMetric:
         self, pair: Pair, spectra: Complex64, sensitivity: ChannelSensitivity, pool: Pool
     ) -> list[F32]:
         """Integrated energies of each band, (3, n, h', w') as `Transducer` takes them."""
-        noise = None
-        if pair.noise_variance is not None:
-            noise = self._bank.noise(pair.noise_variance, pair.noise_blur_px)
         found = []
         for band in self.bands:
             direction = None
@@ -121,7 +117,7 @@ class ModernMetric:
                 direction = MotionDirection(sensitivity, pair.velocity, self._aperture, band)
             area = pool.area(band.reduction)
             energies = np.empty((3, len(band.orientations), *self._aperture.shape), dtype=np.float32)
-            channels = self._bank.channels(spectra, band, pair.valid, noise)
+            channels = self._bank.channels(spectra, band, pair.valid)
             for index, (channel, weight) in enumerate(zip(channels, sensitivity.weights(band), strict=True)):
                 # Express contrasts in units of the threshold; the uniform part stands still.
                 reference, difference = channel.reference * weight, channel.counted * weight

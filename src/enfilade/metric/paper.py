@@ -14,7 +14,6 @@ from enfilade.metric.comparison import Comparison
 from enfilade.metric.csf import spatiovelocity_sensitivity
 from enfilade.metric.inputs import Pair
 from enfilade.metric.masking import MASK_SLOPE, check_mask_slope, threshold_elevation
-from enfilade.metric.noise import response_variance
 from enfilade.metric.pooling import POOLING_EXPONENT, Pool, raised
 from enfilade.metric.pyramid import Pyramid
 from enfilade.metric.sensitivity import ChannelSensitivity, SensitivityTable
@@ -30,9 +29,8 @@ class PaperMetric:
     2. Cortex transform (Watson 1987, Daly 1993): `channels`, `cortex`.
     3. Retinal velocity, with smooth pursuit and without (Eq. 5): `eye`.
     4. Spatiovelocity contrast sensitivity (Eq. 4): `csf`, `sensitivity`.
-    5. Differences that Monte Carlo noise explains are not counted: `noise`.
-    6. Mutual visual masking by threshold elevation (Daly 1993): `masking`.
-    7. Pooling over channels and probability of detection (§6): `pooling`, `comparison`.
+    5. Mutual visual masking by threshold elevation (Daly 1993): `masking`.
+    6. Pooling over channels and probability of detection (§6): `pooling`, `comparison`.
 
     Parameters
     ----------
@@ -57,15 +55,10 @@ class PaperMetric:
         test, reference = adaptation.respond(pair.test), adaptation.respond(pair.reference)
         # Transform the difference rather than the test, so that equal images give exactly zero.
         spectra = self._bank.spectra(reference, test - reference)
-        noise = None
-        if pair.noise_variance is not None:
-            luminance = np.float32(0.5) * (pair.test + pair.reference)
-            variance = response_variance(luminance, pair.noise_variance)
-            noise = self._bank.noise(variance, pair.noise_blur_px)
         sensitivity = adaptation.sensitivity(self._table, pair.valid.shape, pair.velocity, eyes)
         pool = Pool(len(self.bands), pair.valid, POOLING_EXPONENT)
         for band in self.bands:
-            channels = self._bank.channels(spectra, band, pair.valid, noise)
+            channels = self._bank.channels(spectra, band, pair.valid)
             for channel, weight in zip(channels, sensitivity.weights(band), strict=True):
                 # Express contrasts in units of the threshold; the uniform part stands still.
                 difference = channel.counted * weight

@@ -35,15 +35,6 @@ def halve(fine: F32) -> F32:
     return coarse
 
 
-def halve_periodic(fine: F32) -> F32:
-    """Average a periodic map of even size down by two, with the weights of `halve`; the mean stays."""
-    for axis in (0, 1):
-        even, odd = (fine[::2], fine[1::2]) if axis == 0 else (fine[:, ::2], fine[:, 1::2])
-        quarter = np.float32(0.25)
-        fine = np.float32(0.5) * even + quarter * odd + quarter * np.roll(odd, 1, axis=axis)
-    return fine
-
-
 def double(coarse: F32, shape: tuple[int, int]) -> F32:
     """Interpolate a map up by two, bilinearly, to a height and width; the inverse of `halve` in size."""
     rows = np.empty((shape[0], coarse.shape[1]), dtype=np.float32)
