@@ -72,6 +72,16 @@ def test_a_pan_blurs_bars_across_it(aqm):
     assert panned < 0.1 * still
 
 
+def test_several_eye_movements_are_compared_at_once(aqm, textured):
+    velocity = np.full((128, 160, 2), 3.0, np.float32)
+    one, other = (LuminanceHalves(i, i) for i in (textured, darker_patch(textured)))
+    found = aqm.compare_each(other, one, pursuits=list(Pursuit), velocity=velocity)
+    for pursuit, each in zip(Pursuit, found, strict=True):
+        alone = aqm.compare(other, one, velocity=velocity, pursuit=pursuit)
+        assert alone.score == each.score > 0.0
+        assert alone.jnd.tobytes() == each.jnd.tobytes()
+
+
 def test_masked_pixels_do_not_count(aqm, textured):
     valid = np.ones(textured.shape, bool)
     valid[30:90, 40:110] = False

@@ -12,10 +12,10 @@ Of images without noise this is the published metric with energies integrated ov
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from enfilade.metric.aperture import APERTURE_SIGMA_DEG, Aperture
 from enfilade.metric.channels import ChannelBank, uniform_part
@@ -60,7 +60,12 @@ class HalvesAqm:
         self.viewing = viewing
         self._mask_slope = mask_slope
         self._bank = ChannelBank(viewing, workers=workers)
-        self._table = SensitivityTable(_csf, self._bank.bands, viewing.pixels_per_degree)
+        gain = 10.0 ** (GAIN_DB / 20.0)
+        self._table = SensitivityTable(
+            lambda rho, velocity, _: gain * spatiovelocity_sensitivity(rho, velocity),
+            self._bank.bands,
+            viewing.pixels_per_degree,
+        )
         self._aperture = Aperture(self._bank.image_shape, viewing.pixels_per_degree, APERTURE_SIGMA_DEG)
 
     def compare(
@@ -72,21 +77,34 @@ class HalvesAqm:
         valid: Mask | None = None,
         pursuit: Pursuit = Pursuit.BOTH,
     ) -> Comparison:
-        """Predict the visible differences of two images; see `Aqm.compare`.
+        """Predict the visible differences of two images; see `compare_each`."""
+        (found,) = self.compare_each(test, reference, pursuits=[pursuit], velocity=velocity, valid=valid)
+        return found
+
+    def compare_each(
+        self,
+        test: LuminanceHalves,
+        reference: LuminanceHalves,
+        *,
+        pursuits: Sequence[Pursuit],
+        velocity: F32 | None = None,
+        valid: Mask | None = None,
+    ) -> list[Comparison]:
+        """Predict the visible differences of two images for each of several eye movements; see `Aqm.compare`.
 
         Parameters
         ----------
         test, reference : LuminanceHalves
             The noise of all four images is independent.
+        pursuits
+            Eye movements while the image moves.
         velocity, valid
             As in `Aqm.compare`.
-        pursuit
-            Eye movement while the image moves.
 
         Returns
         -------
-        Comparison
-            Exactly zero where both halves are equal.
+        list of Comparison
+            One for each of `pursuits`; exactly zero where both halves are equal.
 
         Raises
         ------
@@ -105,25 +123,33 @@ class HalvesAqm:
         images = [adaptation.respond(one) for one in (reference_a, reference_b, test_a, test_b)]
         spectra = self._bank.spectra(*images[:2], images[2] - images[0], images[3] - images[1])
         moving = None if velocity is None else coarse_velocity(velocity, is_valid)
-        sensitivity = adaptation.sensitivity(self._table, is_valid.shape, moving, pursuit.hypotheses)
+        eyes = [
+            (
+                adaptation.sensitivity(self._table, is_valid.shape, moving, pursuit.hypotheses),
+                Pool(len(self._bank.bands), is_valid, POOLING_EXPONENT),
+            )
+            for pursuit in pursuits
+        ]
 
         # Integrate what the halves share, and mask it.
-        pool = Pool(len(self._bank.bands), is_valid, POOLING_EXPONENT)
         for band in self._bank.bands:
-            ring, area = self._bank.cortex.ring(spectra, band), pool.area(band.reduction)
-            for orientation, weight in zip(band.orientations, sensitivity.weights(band), strict=True):
+            ring, weights = self._bank.cortex.ring(spectra, band), [eye.weights(band) for eye, _ in eyes]
+            for orientation in band.orientations:
                 contrast = self._bank.crop(self._bank.cortex.fan(ring, band, orientation), band)
-                channel = contrast * weight
-                tests = channel[:2] + channel[2:]
-                if band.is_base:
-                    more = sensitivity.at_rest(band) - weight  # the uniform part stands still
-                    sampled = is_valid[:: band.reduction, :: band.reduction]
-                    channel[2:] += [uniform_part(one, sampled) * more for one in contrast[2:]]
-                products = _excess(*channel[2:]), channel[0] * channel[1], tests[0] * tests[1]
-                energy, *maskers = (self._integrated(one, area, band) for one in products)
-                energy /= np.square(threshold_elevation(np.sqrt(np.minimum(*maskers)), self._mask_slope))
-                pool.add(band.level, raised(energy), self._aperture.reduction)
-        return pool.comparison()
+                for (sensitivity, pool), weight in zip(eyes, map(next, weights), strict=True):
+                    channel = contrast * weight
+                    tests = channel[:2] + channel[2:]
+                    if band.is_base:
+                        more = sensitivity.at_rest(band) - weight  # the uniform part stands still
+                        sampled = is_valid[:: band.reduction, :: band.reduction]
+                        channel[2:] += [uniform_part(one, sampled) * more for one in contrast[2:]]
+                    products = _excess(*channel[2:]), channel[0] * channel[1], tests[0] * tests[1]
+                    area = pool.area(band.reduction)
+                    energy, *maskers = (self._integrated(one, area, band) for one in products)
+                    elevation = threshold_elevation(np.sqrt(np.minimum(*maskers)), self._mask_slope)
+                    energy /= np.square(elevation)
+                    pool.add(band.level, raised(energy), self._aperture.reduction)
+        return [pool.comparison() for _, pool in eyes]
 
     def _integrated(self, product: F32, area: F32 | None, band: Band) -> F32:
         """Energy under the aperture, 0 or more."""
@@ -136,10 +162,3 @@ def _excess(first: F32, second: F32) -> F32:
     """Shared less unshared energy of two halves, a b - (a - b)^2 / 2; signed."""
     excess: F32 = first * second - np.float32(0.5) * np.square(first - second)
     return excess
-
-
-def _csf(
-    frequency_cpd: float, velocity_deg_s: npt.NDArray[np.float64], _luminance: npt.NDArray[np.float64]
-) -> npt.NDArray[np.float64]:
-    gain: float = 10.0 ** (GAIN_DB / 20.0)
-    return gain * spatiovelocity_sensitivity(frequency_cpd, velocity_deg_s)

@@ -17,7 +17,7 @@ from enfilade.metric.masking import MASK_SLOPE, check_mask_slope, threshold_elev
 from enfilade.metric.pooling import POOLING_EXPONENT, Pool, raised
 from enfilade.metric.pyramid import Pyramid
 from enfilade.metric.sensitivity import ChannelSensitivity, SensitivityTable
-from enfilade.records import F32, F64, Mask
+from enfilade.records import F32, Mask
 from enfilade.settings import Pursuit
 from enfilade.viewing import Viewing
 
@@ -46,7 +46,11 @@ class PaperMetric:
         self._mask_slope = mask_slope
         self._bank = ChannelBank(viewing)
         self.bands = self._bank.bands
-        self._table = SensitivityTable(_csf, self.bands, viewing.pixels_per_degree)
+        self._table = SensitivityTable(
+            lambda rho, velocity, _: spatiovelocity_sensitivity(rho, velocity),
+            self.bands,
+            viewing.pixels_per_degree,
+        )
 
     def compare(self, pair: Pair, eyes: Sequence[Pursuit]) -> Comparison:
         """Compare two images; the most sensitive of several eye movements counts."""
@@ -118,10 +122,6 @@ def adapt(reference_cd_m2: F32, valid: Mask) -> Adaptation:
     mean = _mean(response(reference_cd_m2), valid)
     darkest = float(response(np.asarray(DARKEST_CD_M2, dtype=np.float32)))
     return Adaptation(adapting, mean, 1.0 / (max(mean, darkest) * contrast_gain(adapting)))
-
-
-def _csf(frequency_cpd: float, velocity_deg_s: F64, _luminance_cd_m2: F64) -> F64:
-    return spatiovelocity_sensitivity(frequency_cpd, velocity_deg_s)
 
 
 def _mean(image: F32, valid: Mask) -> float:

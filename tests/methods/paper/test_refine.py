@@ -11,7 +11,8 @@ from enfilade.methods.paper import refine
 from enfilade.methods.paper.keyframe import trace_keyframe
 from enfilade.methods.paper.method import Paper
 from enfilade.methods.paper.refine import Refinement, SegmentResult, leaf_of
-from enfilade.records import Keyframe, Provenance
+from enfilade.metric import HalvesAqm
+from enfilade.records import Geometry, Keyframe, Provenance
 from support.closed_room import opened_room, room_path
 from support.example_scenes import slide
 from support.in_memory import run_passes, walk_of
@@ -93,6 +94,21 @@ def test_segments_whose_keyframes_show_nothing_of_the_middle_are_split():
     assert all(r.percent_visible is None for r in results)
     table = results[0].to_table((1, 2, 3, 4, 5))
     assert SegmentResult.from_table(table, (1, 2, 3, 4, 5)) == results[0]
+
+
+@pytest.mark.parametrize(("change", "count"), [("none", 1), ("highlight", 2)])
+def test_the_metric_judges_masks_of_specular_shapes_and_then_the_rest(monkeypatch, change, count):
+    compare, times = HalvesAqm.compare_each, []
+    monkeypatch.setattr(
+        HalvesAqm, "compare_each", lambda *of, **more: times.append(0) or compare(*of, **more)
+    )
+    walk = walk_of(planted_path(), PlantedWall(change, noise=0.0), viewing={"diagonal_m": 0.05})
+    if change == "highlight":
+        monkeypatch.setattr(Geometry, "is_specular", property(lambda of: of.shape_index > 0))
+    Refinement(walk).compare(
+        Segment(0, 2), lambda frame: Keyframe(walk.view(frame).geometry, trace_keyframe(walk, frame))
+    )
+    assert len(times) == count
 
 
 def test_no_more_threads_than_dr_jit_has(monkeypatch):

@@ -129,24 +129,28 @@ class Refinement:
         view, masks = walk.view(middle), walk.settings[MaskSettings]
         warped = warped_pair(walk, keyframe(segment.first), keyframe(segment.last), middle)
 
-        # Compare inside the surfaces that both keyframes show.
+        # Find the inside of the surfaces that both keyframes show.
         tolerance = walk.settings[WarpSettings].depth_tolerance
         is_outline = outline_pixels(view.geometry, tolerance)
         is_inside = ~is_outline
         agreed = [agrees(one, view.geometry, is_outline, tolerance) for one in warped]
         is_compared = is_inside & agreed[0] & agreed[1]
-        jnd, jnd_no_pursuit = self._differences(view, warped, is_compared)
 
         # Mask the pixels that will be traced: slow ones, and specular shapes whose reuse is visible.
-        reusable = reusable_specular_shapes(jnd, is_compared, is_inside, view.geometry, masks)
+        reusable: frozenset[int] = frozenset()
+        if (is_compared & view.geometry.is_specular).any():
+            (jnd,) = self._differences(view, warped, is_compared, Pursuit.PURSUIT)
+            reusable = reusable_specular_shapes(jnd, is_compared, is_inside, view.geometry, masks)
         is_slow = slow_pixels(view.speed_deg_s, masks)
         is_masked = is_slow | specular_pixels(view.geometry, reusable)
         unmasked = is_compared & ~is_masked
-        if (is_compared & ~unmasked).any() and unmasked.mean() >= MIN_COMPARED:
-            # Compare again without them: the metric's filters spread a difference over its neighbourhood.
-            jnd, jnd_no_pursuit = self._differences(view, warped, unmasked)
         is_disoccluded = ~is_masked & ~agreed[0] & ~agreed[1]
-        percent, percent_no_pursuit = (_percent_visible(j, unmasked) for j in (jnd, jnd_no_pursuit))
+
+        # Compare without them: the metric's filters spread a difference over its neighbourhood.
+        percent = percent_no_pursuit = None
+        if unmasked.mean() >= MIN_COMPARED:
+            maps = self._differences(view, warped, unmasked, Pursuit.PURSUIT, Pursuit.NONE)
+            percent, percent_no_pursuit = (100.0 * float((jnd[unmasked] > 1.0).mean()) for jnd in maps)
         return SegmentResult(
             *ends,
             middle=middle,
@@ -156,8 +160,10 @@ class Refinement:
             is_split=(percent or 0.0) > masks.split_percent or is_disoccluded.mean() > MOST_DISOCCLUDED,
         )
 
-    def _differences(self, view: View, warped: tuple[Warped, Warped], is_compared: Mask) -> tuple[F32, F32]:
-        """JND maps between two warped keyframes, with smooth pursuit and without."""
+    def _differences(
+        self, view: View, warped: tuple[Warped, Warped], is_compared: Mask, *pursuits: Pursuit
+    ) -> list[F32]:
+        """JND maps between two warped keyframes, one for each eye movement."""
         walk = self._walk
         density, settings = walk.viewing.pixels_per_degree, walk.settings[AntialiasSettings]
         support = spatial_support_px(view.speed_deg_s, density, settings)
@@ -165,16 +171,7 @@ class Refinement:
             LuminanceHalves(walk.display_luminance(one.first), walk.display_luminance(one.second))
             for one in shown_alike(*warped, is_compared, support)
         ]
-        jnd, jnd_no_pursuit = (
-            self._metric.compare(
-                *images, velocity=view.velocity_deg_s, valid=is_compared, pursuit=pursuit
-            ).jnd
-            for pursuit in (Pursuit.PURSUIT, Pursuit.NONE)
+        found = self._metric.compare_each(
+            *images, pursuits=pursuits, velocity=view.velocity_deg_s, valid=is_compared
         )
-        return jnd, jnd_no_pursuit
-
-
-def _percent_visible(jnd: F32, where: Mask) -> float | None:
-    if where.mean() < MIN_COMPARED:
-        return None
-    return 100.0 * float((jnd[where] > 1.0).mean())
+        return [one.jnd for one in found]
