@@ -44,8 +44,8 @@ def composite(
     is_disoccluded = total <= 0.0
 
     # Blend.
-    first = np.where(is_disoccluded, 0.0, weight_before / np.where(is_disoccluded, 1.0, total))[..., None]
-    last = np.where(is_disoccluded[..., None], 0.0, 1.0 - first)
+    total = np.where(is_disoccluded, 1.0, total)
+    first, last = ((weight / total)[..., None] for weight in (weight_before, weight_after))
     color = first * before.color + last * after.color
     return color.astype(np.float32), is_disoccluded
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy.ndimage
 
 from enfilade.records import F32, U8, Geometry, Mask, Provenance
 from enfilade.settings import MaskSettings
@@ -46,8 +47,6 @@ def reusable_specular_shapes(
         Shape indices. All other specular shapes must be traced in the whole segment, also those that this
         frame does not show.
     """
-    import scipy.ndimage
-
     is_candidate = geometry.is_specular & is_compared
     reusable: set[int] = set()
     for shape_index in np.unique(geometry.shape_index[is_candidate]).tolist():
@@ -89,8 +88,6 @@ def provenance_of(is_slow: Mask, is_specular: Mask, is_disoccluded: Mask) -> U8:
 
 def _is_visible(jnd: F32, region: Mask, least: float, settings: MaskSettings) -> bool:
     """Whether a region differs visibly; `least` is the size from which the percentage above 1 JND counts."""
-    import scipy.ndimage
-
     # Compare the percentage above 1 JND.
     size = np.count_nonzero(region)
     percent = 100.0 * float(np.mean(jnd[region] > 1.0))
