@@ -307,6 +307,17 @@ def test_a_mesh_with_nan_vertices_is_refused(tmp_path):
         MitsubaRenderer(tmp_path / "scene.xml")
 
 
+def test_tables_of_lobes_are_made_for_the_methods_that_read_them(corner_file):
+    renderer, camera = opened(corner_file), Camera(look_at((1, 1.5, 3.5), (0, 0.6, 0)), 45.0, 32, 24)
+    find_geometry(renderer, camera)
+    traced(renderer, camera)
+    made = vars(renderer), vars(renderer._lobes)
+    assert not any(name in of for of in made for name in ("_transport", "specular_albedos"))
+    assert renderer.state
+    assert "_transport" in made[0]
+    assert "specular_albedos" in made[1]
+
+
 def test_arrays_of_a_scene_are_aligned_like_those_of_dr_jit(corner):
     # Kernels differ by the alignment of their inputs, which NumPy's memory has by chance.
     def arrays(state):

@@ -28,9 +28,10 @@ def test_mitsuba_reads_xml(scene):
 
 def test_a_scene_that_mitsuba_loads_and_does_not_render(scene):
     hot = '<spectrum name="intensity" type="blackbody"><float name="temperature" value="4000"/></spectrum>'
-    of = Scene(scene(f'{BALL}<emitter type="point">{hot}</emitter>'))
-    with pytest.raises(SceneError, match=r"can't render .*scene.xml: .*[Nn]ot implemented"):
-        of.open(Settings())
+    bump = '<bsdf type="bumpmap"><texture type="checkerboard"/><bsdf type="diffuse"/></bsdf>'
+    for more in (f'<emitter type="point">{hot}</emitter>', f'<shape type="cube">{bump}</shape>'):
+        with pytest.raises(SceneError, match=r"can't render .*scene.xml: .*[Nn]ot implemented"):
+            Scene(scene(BALL + more)).open(Settings())
 
 
 def test_a_renderer_of_your_own(tmp_path):

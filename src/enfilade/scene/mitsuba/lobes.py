@@ -14,6 +14,7 @@ lobe; it may be negative. A mask over a Lambertian BSDF has nothing but its null
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import drjit as dr
@@ -85,12 +86,12 @@ class Lobes:
         self._has_whole = bool(dr.any(self._whole))
         self._mixed = bsdf_table(scene, mixes_delta_lobes)
         self._has_mixed = bool(dr.any(self._mixed))
-        self._specular_albedo = self._mean_specular_albedo(scene)
+        self._scene = scene
 
     @property
     def state(self) -> Any:
-        """Arrays that the methods read."""
-        albedos = self._bases, self._turned, self._masked, self._specular_albedo
+        """Arrays that the methods read, but for that of `specular_albedo`."""
+        albedos = self._bases, self._turned, self._masked
         interfaces = self._clear, self._rough_ior, self._narrow, self._coated
         return self._whole, self._lambertian, self._sides, self._mixed, interfaces, albedos
 
@@ -114,7 +115,7 @@ class Lobes:
     def specular_albedo(self, si: Any, bsdf: Any) -> Any:
         """Albedo of the specular lobes, a mean over all points of a BSDF, by the viewer's angle; Float."""
         entry = _albedo_entry(_number(bsdf), si.wi.z)
-        return dr.gather(Float, self._specular_albedo, entry, si.is_valid())
+        return dr.gather(Float, self.specular_albedos, entry, si.is_valid())
 
     def albedo(self, si: Any, bsdf: Any, active: Any) -> Any:
         """Albedo of the diffuse lobe, 0..1; Color3f."""
@@ -268,16 +269,17 @@ class Lobes:
             sample.pdf = dr.select(is_mixed, own, sample.pdf)
         return sample, weight
 
-    def _mean_specular_albedo(self, scene: Any) -> Any:
+    @cached_property
+    def specular_albedos(self) -> Any:
         """Table of :meth:`specular_albedo`, estimated where random rays through the scene hit; Float."""
         sampler = one_sequence(ALBEDO_SAMPLES, ALBEDO_SEED)
-        box = scene.bbox()
+        box = self._scene.bbox()
 
         def random_point() -> Any:
             return box.min + mi.Vector3f(*sampler.next_2d(), sampler.next_1d()) * box.extents()
 
         start, end = random_point(), random_point()
-        si = scene.ray_intersect(mi.Ray3f(start, dr.normalize(end - start)))
+        si = self._scene.ray_intersect(mi.Ray3f(start, dr.normalize(end - start)))
         bsdf = si.bsdf()
         _, pdf, weight, *_ = self.sample_specular(si, bsdf, sampler)
         value = dr.select(pdf > 0.0, dr.max(dr.abs(weight)), 0.0)

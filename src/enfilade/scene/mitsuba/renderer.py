@@ -87,8 +87,6 @@ class MitsubaRenderer:
         self._sampler = _lane_sampler()
         self._lobes = Lobes(scene)
         self._is_volumetric = is_volumetric(self._integrator)
-        shadow_rays = ShadowRays(scene, pass_to_all=self._is_volumetric)
-        self._transport = LightTransport(scene, self._lobes, self._continued_radiance, shadow_rays)
         self._shapes = Shapes(self._merged)
         self._description = SceneDescription(
             renderer=f"Mitsuba {mi.__version__}",
@@ -97,10 +95,15 @@ class MitsubaRenderer:
             has_background=scene.environment() is not None,
             notes=(*ignored(scene, self._integrator), *warnings),
         )
-        self._surfaces = recorded(lambda rays: self._intersect(rays)[0], lambda: self.state)
+        self._surfaces = recorded(
+            lambda rays: self._intersect(rays)[0], lambda: (scene, self._shapes.state, self._lobes.state)
+        )
         # Mitsuba builds the sampling table of an emitting mesh when it is first used. That must not happen
         # while a kernel is recorded.
         dr.eval(scene.sample_emitter_direction(dr.zeros(mi.SurfaceInteraction3f), mi.Point2f(0.5)))
+        # Raise errors of BSDFs that can't be sampled now, and not in a task.
+        si = scene.ray_intersect(mi.Ray3f(mi.Point3f(scene.bbox().min), mi.Vector3f(0.0, 0.0, 1.0)))
+        si.bsdf().sample(mi.BSDFContext(), si, Float(0.5), mi.Point2f(0.5))
 
     def describe(self) -> SceneDescription:
         """Description of the scene and the renderer."""
@@ -142,7 +145,8 @@ class MitsubaRenderer:
         """See :attr:`enfilade.renderer.LobeRenderer.state`."""
         integrators = self._integrator, self._continued
         lights = self._transport.sharp_emitters.state
-        return self._scene, integrators, self._shapes.state, self._lobes.state, lights
+        lobes = self._lobes.state, self._lobes.specular_albedos
+        return self._scene, integrators, self._shapes.state, lobes, lights
 
     def emitters(self) -> Emitters:
         """See :meth:`enfilade.renderer.LobeRenderer.emitters`."""
@@ -151,6 +155,11 @@ class MitsubaRenderer:
     def photons(self) -> Photons:
         """See :meth:`enfilade.renderer.LobeRenderer.photons`."""
         return self._photons
+
+    @cached_property
+    def _transport(self) -> LightTransport:
+        shadow_rays = ShadowRays(self._scene, pass_to_all=self._is_volumetric)
+        return LightTransport(self._scene, self._lobes, self._continued_radiance, shadow_rays)
 
     @cached_property
     def _emitters(self) -> Emitters:
