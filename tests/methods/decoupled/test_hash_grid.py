@@ -236,7 +236,7 @@ def test_every_key_is_found_and_no_other(count):
     points, normals = random_points(2 * count, seed=count)
     key = keys(points, normals, 1e-4)
     light = np.arange(1, count + 1)[:, None] * np.ones(3)
-    grid = Entries.of([key[:count]], light).repeated(MIN_SAMPLES).upload()
+    grid = Entries.of([key[:count]], light).weighted(MIN_SAMPLES).upload()
     at = Array3f(points.T.astype(np.float32)), Array3f(normals.T.astype(np.float32)), UInt(1), Float(1e-4)
     found, is_hit = (np.array(v) for v in grid.lookup(*at))
     assert is_hit.tolist() == [True] * count + [False] * count

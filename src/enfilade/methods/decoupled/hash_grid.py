@@ -165,7 +165,8 @@ class Entries:
     sums : (N, 3) float64
     squares : (N,) float64
         Sums of squared luminance.
-    counts : (N,) int64
+    counts : (N,) int64 or float64
+        The latter where estimates have a weight.
     parents : (N,) uint64
         Keys of the entries of twice the size; 0 where no estimate was kept in it.
     """
@@ -173,7 +174,7 @@ class Entries:
     keys: npt.NDArray[np.uint64]
     sums: npt.NDArray[np.float64]
     squares: npt.NDArray[np.float64]
-    counts: npt.NDArray[np.int64]
+    counts: npt.NDArray[np.int64] | npt.NDArray[np.float64]
     parents: npt.NDArray[np.uint64]
 
     @staticmethod
@@ -200,9 +201,12 @@ class Entries:
             [Entries(key, light, squares, ones, above) for key, above in zip(keys, parents, strict=True)]
         )
 
-    def repeated(self, times: int) -> Entries:
-        """The entries as if each estimate had been made several times."""
-        return replace(self, sums=self.sums * times, squares=self.squares * times, counts=self.counts * times)
+    def weighted(self, weight: float) -> Entries:
+        """The entries as if each estimate had been made so often; a fraction of few bits keeps sums exact."""
+        if weight == 1:
+            return self
+        sums, squares, counts = (np.multiply(of, weight) for of in (self.sums, self.squares, self.counts))
+        return replace(self, sums=sums, squares=squares, counts=counts)
 
     @staticmethod
     def joined(parts: Sequence[Entries]) -> Entries:
@@ -217,7 +221,7 @@ class Entries:
         totals: Any = [np.bincount(place, v, len(keys)) for v in (*sums.T, squares, counts)]
         parents, has_parent = np.full(len(keys), NO_PARENT), above != NO_PARENT
         parents[place[has_parent]] = above[has_parent]
-        return Entries(keys, np.stack(totals[:3], axis=1), totals[3], totals[4].astype(np.int64), parents)
+        return Entries(keys, np.stack(totals[:3], axis=1), totals[3], totals[4].astype(counts.dtype), parents)
 
     def upload(self) -> HashGrid | None:
         """Upload the entries with enough samples; None if there are none."""
@@ -269,7 +273,7 @@ class Entries:
         found = np.minimum(np.searchsorted(self.keys, self.parents), max(len(self.keys) - 1, 0))
         has_parent = (self.parents != NO_PARENT) & (self.keys[found] == self.parents)
         child, parent = np.flatnonzero(has_parent), found[has_parent]
-        freedom = np.bincount(parent, self.counts[child] - 1, len(self.keys))
+        freedom = np.bincount(parent, np.maximum(self.counts[child] - 1, 0), len(self.keys))
         pooled = np.bincount(parent, deviation[child], len(self.keys)) / np.maximum(freedom, 1.0)
         is_reliable = np.zeros(len(self.keys), np.bool_)
         error, counts = np.sqrt(pooled[parent] / self.counts[child]), self.counts[child]

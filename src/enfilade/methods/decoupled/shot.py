@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from enfilade.cache import LruCache
-from enfilade.camera.path import Segment
+from enfilade.camera.path import CameraPath, Segment
 from enfilade.camera.pinhole import Camera
 from enfilade.kernels.estimate import Estimate, Radiance
 from enfilade.kernels.guiding import PathGuide
@@ -32,6 +33,8 @@ from enfilade.renderer import LobeRenderer, PixelFilter, RandomKey, Rays
 from enfilade.settings import DecoupledSettings, LimitSettings
 
 HASH_GRID_KEYFRAMES = 8  # nearest ones whose entries are looked up
+FADE = 0.25  # of the distance of the next keyframe, over which entries fade
+FADE_STEPS = 4  # of their weight: each uploads the hash grid again
 MIN_WEIGHT = 1e-3  # of an image, which then counts only where no other shows the surface
 
 
@@ -70,7 +73,7 @@ class ShotContext:
         self.settings = walk.settings[DecoupledSettings]
         self.images = ImageStore(segments, inputs, walk)
         self._entries: LruCache[int, Entries] = LruCache(HASH_GRID_KEYFRAMES)
-        self._hash_grid: tuple[list[int], HashGrid | None] = ([], None)
+        self._hash_grid: tuple[dict[int, float], HashGrid | None] = ({}, None)
         self._path_guides: LruCache[int, PathGuide | None] = LruCache(2)
         self._blank: list[UploadedImage] = []
 
@@ -155,10 +158,13 @@ class ShotContext:
 
     def hash_grid(self, frame: int) -> HashGrid | None:
         """The hash grid near a frame."""
-        near = sorted(nearest(self.walk.path, self.keyframes, frame, HASH_GRID_KEYFRAMES))
-        if self._hash_grid[0] != near:
-            parts = [self._entries.get(k, lambda k=k: self.inputs.record("hash_grid", k)) for k in near]  # type: ignore[misc]
-            self._hash_grid = near, Entries.joined(parts).upload()
+        weights = hash_grid_weights(self.walk.path, self.keyframes, frame)
+        if self._hash_grid[0] != weights:
+            parts = [
+                self._entries.get(k, lambda k=k: self.inputs.record("hash_grid", k)).weighted(weight)  # type: ignore[misc]
+                for k, weight in weights.items()
+            ]
+            self._hash_grid = weights, Entries.joined(parts).upload()
         return self._hash_grid[1]
 
     def shading_cache(self, frame: int) -> IrradianceCache:
@@ -235,6 +241,20 @@ class ShotContext:
         """The segment of a frame, whose disocclusion images it uses."""
         # The last segment ends where the camera stops: all frames after it repeat its pose.
         return next((s for s in self.segments if frame <= s.last), self.segments[-1])
+
+
+def hash_grid_weights(path: CameraPath, keyframes: list[int], frame: int) -> dict[int, float]:
+    """Weights of the keyframes whose entries of the hash grid are looked up from a frame, in order.
+
+    They fall to zero where the next keyframe replaces them.
+    """
+    near = nearest(path, keyframes, frame, HASH_GRID_KEYFRAMES + 1)
+    distances = {k: abs(path.distance(k) - path.distance(frame)) for k in near}
+    reach = distances[near[-1]] if len(near) > HASH_GRID_KEYFRAMES else math.inf
+    steps = {
+        k: min(round((1.0 - distances[k] / reach) / FADE * FADE_STEPS), FADE_STEPS) for k in sorted(near)
+    }
+    return {k: step / FADE_STEPS for k, step in steps.items() if step}
 
 
 def either_side(frames: list[int], frame: int) -> list[int]:
