@@ -139,6 +139,16 @@ def test_the_light_of_a_small_lamp_counts_once(tmp_path, others):
     assert rows(found).mean(axis=0) == pytest.approx(rows(whole).mean(axis=0), rel=0.01)
 
 
+def test_samples_of_the_sky_beside_a_sun_are_few_times_empty(tmp_path):
+    # Half of the sky's flux is that of the sun, and half of the other is below the floor.
+    renderer, count = opened(tmp_path, SKIES["photographed"]), 1 << 14
+    rays = Rays(*(Array3f(*of) + dr.zeros(Array3f, count) for of in ((-1.5, 1.0, 1.5), (0.0, -1.0, 0.0))))
+    sample = renderer.sample_diffuse(renderer.intersect(rays), one_sequence(count), soft_only=True)
+    light = rows(sample.direct)[:, 1]
+    assert (light > 0.0).mean() > 0.6  # 0.25 with a single candidate
+    assert light.std() < 1.5 * light.mean()  # 2.4
+
+
 def test_of_many_small_lamps_none_casts_sharp_shadows(tmp_path):
     bulbs = "".join(BULB.format(0.02, f"{i / 10 - 1}, 1.5, 0.5", "30, 20, 10") for i in range(5))
     assert not opened(tmp_path, bulbs).has_sharp_light

@@ -18,6 +18,7 @@ from enfilade.scene.mitsuba.shadow_rays import ShadowRays, Target
 from enfilade.scene.mitsuba.sun import find_sun
 
 SHADOW_RAYS = 4  # beside that to the sun
+SUN_CANDIDATES = 4  # least number for soft light beside a sun, since those in the sun are left out
 SMALL = 0.08  # half the width of a small lamp, over the mean distance of what it lights
 DISTANCE_RAYS = 256  # for this mean
 
@@ -33,7 +34,7 @@ class SharpEmitters:
     Attributes
     ----------
     count, soft_count : int
-        Number of emitters that are sampled, and of soft ones among them.
+        Number of candidates of next-event estimation: one an emitter that is sampled, or a soft one.
     """
 
     def __init__(self, scene: Any, shadow_rays: ShadowRays) -> None:
@@ -59,6 +60,8 @@ class SharpEmitters:
         # A literal zero has the size of its lanes, which a recorded kernel does not adapt.
         self._zero = opaque(0.0)
         self.soft_count = int((soft > 0.0).sum())
+        if self._sun is not None and self._soft is not None:
+            self.soft_count = max(self.soft_count, SUN_CANDIDATES)
 
         # Factors from the scene's density of an emitter to that of its own estimate, by its number in the
         # registry of Dr.Jit, where 0 is none.
