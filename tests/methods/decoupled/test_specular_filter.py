@@ -6,7 +6,7 @@ from scipy.ndimage import minimum_filter
 
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry
-from enfilade.methods.decoupled.specular_filter import filter_spatially
+from enfilade.methods.decoupled.specular_filter import DENOISED_SHARE, filter_spatially
 from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE, VirtualImages
 from enfilade.records import Shading
 from support.analytic_truth import geometry_of
@@ -34,6 +34,16 @@ def test_thin_regions_are_smoothed_and_keep_their_energy(denoiser):
     (found,) = filter_spatially([geometry], [band], where, is_denoised=denoiser != "none")
     assert found.color[where].std() < 0.5 * light[where].std()
     assert found.color[where].mean() == pytest.approx(light[where].mean(), rel=0.15)
+
+
+def test_deviations_are_the_same_at_the_border_of_the_sampled_pixels():
+    geometry = geometry_of(wall(), Camera(look_at((0, 0, 4), (0, 0, 0)), 45, 32, 24))
+    where = np.zeros(geometry.shape_index.shape, bool)
+    where[6:18, 4:20] = True
+    grey = np.where(where[..., None], np.float32([0.5, 0.5, 0.5]), np.float32(0))
+    aov = Shading(grey, np.where(where, np.float32(0.04), np.float32(0)))
+    (found,) = filter_spatially([geometry], [aov], where, is_denoised=True)
+    np.testing.assert_allclose(found.deviation[where], DENOISED_SHARE * 0.2, rtol=2e-3)
 
 
 @pytest.mark.parametrize("denoiser", ["none", "balanced"])

@@ -94,8 +94,13 @@ def upload_aovs(geometry: Geometry, aovs: Sequence[SpecularAov], count: int, whe
 def _denoised(geometry: Geometry, aov: Shading, where: Mask) -> SpecularAov:
     """Denoise an AOV, guided by the surfaces that are seen in it."""
     color = denoise_light(geometry, aov, where, quality=DENOISER, outlier=OUTLIER)
-    deviation = DENOISED_SHARE * scipy.ndimage.uniform_filter(np.sqrt(aov.variance), DENOISED_SUPPORT)
-    return SpecularAov(to_half(color), to_half(deviation.astype(np.float32)))
+    # Average the deviation over the sampled pixels.
+    deviation, share = (
+        scipy.ndimage.uniform_filter(of, DENOISED_SUPPORT)
+        for of in (np.sqrt(aov.variance), where.astype(np.float32))
+    )
+    deviation *= DENOISED_SHARE / np.maximum(share, 1.0 / DENOISED_SUPPORT**2)
+    return SpecularAov(to_half(color), to_half(deviation))
 
 
 def _filtered(geometry: Geometry, aov: Shading, where: Mask, weights: Any) -> SpecularAov:
