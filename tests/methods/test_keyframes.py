@@ -16,9 +16,9 @@ adaptations = st.floats(0, 0.9)
 placements = st.sampled_from(list(Placement))
 
 
-def place(speed, placement=Placement.ADAPTED, spacing=25, adaptation=0.5):
+def place(speed, placement=Placement.ADAPTED, spacing=25, adaptation=0.5, **more):
     settings = KeyframeSettings(placement=placement, spacing=spacing, adaptation=adaptation)
-    return place_keyframes(np.asarray(speed, float), settings)
+    return place_keyframes(np.asarray(speed, float), settings, **more)
 
 
 @pytest.mark.parametrize(
@@ -65,6 +65,37 @@ def test_uniform_spacing():
     assert place([1.0] * 61, Placement.UNIFORM) == [0, 25, 50, 60]
     assert place([1.0] * 51, Placement.UNIFORM) == [0, 25, 50]
     assert place([1.0] * 52, Placement.UNIFORM) == [0, 25, 50, 51]
+
+
+@pytest.mark.parametrize("placement", [Placement.UNIFORM, Placement.ADAPTED])
+@pytest.mark.parametrize(
+    ("count", "expected"),
+    [
+        (10, [0, 9]),
+        (12, [0, 11]),
+        (13, [0, 8, 12]),  # half a segment is left
+        (17, [0, 8, 16]),
+        (18, [0, 8, 17]),  # not [0, 8, 16, 17]
+        (27, [0, 9, 17, 26]),
+    ],
+)
+def test_short_rests_are_spread_over_the_other_segments(placement, count, expected):
+    assert place([1.0] * count, placement, 8, spreads_rest=True) == expected
+
+
+@given(speeds, placements, spacings, adaptations)
+def test_with_spread_rests_only_whole_shots_are_shorter_than_half_a_segment(
+    speed, placement, spacing, adaptation
+):
+    plain, spread = (
+        place(speed, placement, spacing, adaptation, spreads_rest=rule) for rule in (False, True)
+    )
+    assert spread[0] == 0
+    assert spread[-1] == len(speed) - 1
+    assert all(a < b for a, b in itertools.pairwise(spread))
+    assert len(plain) - len(spread) in (0, 1)
+    if placement is not Placement.EQUAL_FLOW and len(spread) > 2:
+        assert 2 * (spread[-1] - spread[-2]) >= round((1.0 - adaptation) * spacing) - 2
 
 
 def test_equal_flow_by_hand():

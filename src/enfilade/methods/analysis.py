@@ -74,7 +74,9 @@ class Analysis:
     path: CameraPath
     settings: Settings
     frames: tuple[FrameStatistics, ...]
-    _segments: dict[int, list[list[Segment]]] = field(default_factory=dict, init=False, repr=False)
+    _segments: dict[tuple[int, bool], list[list[Segment]]] = field(
+        default_factory=dict, init=False, repr=False
+    )
 
     @classmethod
     def from_tables(cls, path: CameraPath, settings: Settings, tables: Iterable[Mapping[str, Any]]) -> Self:
@@ -92,7 +94,7 @@ class Analysis:
             "black; check the camera path against the scene: units, axes, the side to which the camera looks"
         )
 
-    def segments(self, spacing: int = SPACING) -> list[list[Segment]]:
+    def segments(self, spacing: int = SPACING, *, spreads_rest: bool = False) -> list[list[Segment]]:
         """Segments between the initial keyframes of each shot (§4.2).
 
         A repeated pose is never a keyframe.
@@ -101,23 +103,26 @@ class Analysis:
         ----------
         spacing
             Of the method, where ``[keyframes] spacing`` is 0; by default the paper's.
+        spreads_rest
+            As of :func:`place_keyframes`.
 
         Returns
         -------
         list of list of Segment
             One list a shot; a shot of one pose has a single segment from that frame to itself.
         """
-        if spacing not in self._segments:
-            self._segments[spacing] = self._placed(spacing)
-        return self._segments[spacing]
+        key = spacing, spreads_rest
+        if key not in self._segments:
+            self._segments[key] = self._placed(spacing, spreads_rest=spreads_rest)
+        return self._segments[key]
 
-    def _placed(self, spacing: int) -> list[list[Segment]]:
+    def _placed(self, spacing: int, *, spreads_rest: bool) -> list[list[Segment]]:
         settings = self.settings[KeyframeSettings]
         settings = replace(settings, spacing=settings.spacing or spacing)
         shots = []
         for shot in self.path.shots():
             speed = np.array([self.frames[frame].speed_px for frame in shot])
-            chosen = place_keyframes(speed, settings)
+            chosen = place_keyframes(speed, settings, spreads_rest=spreads_rest)
             keyframes = sorted({self.path.static_frame(shot.start + k) for k in chosen})
             pairs = itertools.pairwise(keyframes)
             shots.append([Segment(a, b) for a, b in pairs] or [Segment(keyframes[0], keyframes[0])])

@@ -10,7 +10,9 @@ import numpy.typing as npt
 from enfilade.settings import KeyframeSettings, Placement
 
 
-def place_keyframes(speed: npt.NDArray[np.float64], settings: KeyframeSettings) -> list[int]:
+def place_keyframes(
+    speed: npt.NDArray[np.float64], settings: KeyframeSettings, *, spreads_rest: bool = False
+) -> list[int]:
     """Place the initial keyframes of one shot.
 
     Parameters
@@ -19,6 +21,9 @@ def place_keyframes(speed: npt.NDArray[np.float64], settings: KeyframeSettings) 
         Mean magnitude of the image flow of each frame of the shot, in any unit.
     settings
         Spacing Delta, coefficient A, and the rule of placement.
+    spreads_rest
+        Whether the segments become longer where what is left for a last one is shorter than half of it; not
+        those of equal flow.
 
     Returns
     -------
@@ -30,11 +35,13 @@ def place_keyframes(speed: npt.NDArray[np.float64], settings: KeyframeSettings) 
         return [0]
     match settings.placement:
         case Placement.UNIFORM:
-            inner = list(range(settings.spacing, last, settings.spacing))
+            inner = list(range(settings.spacing, last + settings.spacing, settings.spacing))
         case Placement.ADAPTED:
             inner = _adapted(speed, settings.spacing, settings.adaptation)
         case Placement.EQUAL_FLOW:
-            inner = _equal_flow(speed, settings.spacing)
+            inner, spreads_rest = _equal_flow(speed, settings.spacing), False
+    if spreads_rest and len(inner) > 1 and 2 * (last - inner[-2]) < inner[-1] - inner[-2]:
+        inner = [round(k * last / inner[-2]) for k in inner[:-2]]
     return [0, *(k for k in inner if 0 < k < last), last]
 
 
@@ -56,7 +63,7 @@ def segment_length(flow: float, mean_flow: float, spacing: int, adaptation: floa
 
 
 def _adapted(speed: npt.NDArray[np.float64], spacing: int, adaptation: float) -> list[int]:
-    """Adapt the length of each segment to its flow."""
+    """Adapt the length of each segment to its flow; the last one may go beyond the shot."""
     # Average the flow over segments of uniform spacing.
     last = len(speed) - 1
     flows = [speed[k : k + spacing].sum() for k in range(0, last - spacing + 1, spacing)]

@@ -1,4 +1,4 @@
-"""The context of a shot: the hash grid along the path."""
+"""The context of a shot: its keyframes, and the hash grid along the path."""
 
 from types import SimpleNamespace
 
@@ -8,11 +8,18 @@ import pytest
 from enfilade.arrays import Array3f, Float, UInt
 from enfilade.camera.path import CameraPath, Segment
 from enfilade.camera.pinhole import Camera, look_at
+from enfilade.methods.decoupled import Decoupled
 from enfilade.methods.decoupled.hash_grid import Entries, entry_key
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.settings import Settings
+from support.in_memory import analysis_of
 
 SPACING = 8
+
+
+def path_of(count):
+    cameras = tuple(Camera(look_at((f, 0, 4), (f, 0, 0)), 45.0, 8, 6) for f in range(count))
+    return CameraPath(cameras, tuple(range(count)), 24.0)
 
 
 def hash_grid_light(count):
@@ -21,8 +28,7 @@ def hash_grid_light(count):
     key = np.repeat(np.array(entry_key(*at, 0)), 16)
     keyframes = range(0, SPACING * count, SPACING)
     entries = {k: Entries.of([key], np.full((16, 3), 1.0 + k // SPACING)) for k in keyframes}
-    cameras = tuple(Camera(look_at((f, 0, 4), (f, 0, 0)), 45.0, 8, 6) for f in range(keyframes[-1] + 1))
-    path = CameraPath(cameras, tuple(range(len(cameras))), 24.0)
+    path = path_of(keyframes[-1] + 1)
     walk = SimpleNamespace(path=path, settings=Settings())
     inputs = SimpleNamespace(record=lambda _, k: entries[k])
     segments = [Segment(k, k + SPACING) for k in keyframes[:-1]]
@@ -43,3 +49,7 @@ def test_shots_of_few_keyframes_have_one_hash_grid():
     light, grids = hash_grid_light(8)
     assert light == pytest.approx(4.5)
     assert all(grid is grids[0] for grid in grids)
+
+
+def test_the_last_segment_is_not_short():
+    assert Decoupled().keyframes(analysis_of(path_of(18))) == [0, 8, 17]

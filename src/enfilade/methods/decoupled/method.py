@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from enfilade.camera.path import Segment
 from enfilade.methods.analysis import Analysis, keyframes_of
 from enfilade.methods.base import FRAMES, Inputs, Method, Output, Pass, Task, TaskId
 from enfilade.methods.decoupled.hash_grid import Entries
@@ -48,6 +49,11 @@ class _Kernels:
     virtual_images: VirtualImages
 
 
+def _segments(analysis: Analysis) -> list[list[Segment]]:
+    """Segments between the keyframes of each shot."""
+    return analysis.segments(SPACING, spreads_rest=True)
+
+
 class Decoupled(Method):
     """Irradiance cached at keyframes; visibility, texture, edges and specular lobes in every frame."""
 
@@ -80,7 +86,7 @@ class Decoupled(Method):
 
     def keyframes(self, analysis: Analysis) -> list[int]:
         """Keyframes, which have irradiance images."""
-        return [frame for segments in analysis.segments(SPACING) for frame in keyframes_of(segments)]
+        return [frame for segments in _segments(analysis) for frame in keyframes_of(segments)]
 
     def cost_ratios(
         self,
@@ -102,7 +108,7 @@ class Decoupled(Method):
     def tasks(self, analysis: Analysis) -> Iterable[Task]:
         """Tasks of keyframes, segments, and all frames."""
         path = analysis.path
-        shots = zip(path.shots(), analysis.segments(SPACING), strict=True)
+        shots = zip(path.shots(), _segments(analysis), strict=True)
         for number, (shot, segments) in enumerate(shots):
             keyframes = keyframes_of(segments)
             for pass_name in ("prepass", "hash_grid", "irradiance"):
@@ -142,7 +148,7 @@ class Decoupled(Method):
         if self._shot is None or not self._shot.is_of(task, inputs, walk):
             # Free memory before the next shot allocates.
             self._shot, self._accumulation = None, TemporalAccumulation()
-            segments = inputs.analysis.segments(SPACING)[task.shot]
+            segments = _segments(inputs.analysis)[task.shot]
             self._shot = ShotContext(
                 task.shot, segments, inputs, walk, self._kernels.integrator, self._kernels.virtual_images
             )
