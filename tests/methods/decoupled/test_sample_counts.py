@@ -26,19 +26,25 @@ def test_irradiance_spp_follows_the_quality_and_the_averaged_images(quality, key
 
 def test_specular_rays_follow_the_quality_or_the_settings():
     of = [DecoupledSettings(quality=float(q)) for q in (1, 4, 16, 64)]
-    assert [specular_spp(s) for s in of] == [34, 17, 8, 4]
-    assert specular_spp(DecoupledSettings(specular_spp=3)) == 3
+    assert [specular_spp(s, 7) for s in of] == [34, 17, 8, 4]
+    assert specular_spp(DecoupledSettings(specular_spp=3), 1) == 3
+
+
+def test_short_shots_have_more_specular_rays():
+    settings = DecoupledSettings(quality=4.0)
+    assert [specular_spp(settings, frames) for frames in (1, 2, 3, 4, 7, 100)] == [51, 51, 40, 30, 17, 17]
 
 
 def test_tasks_of_long_shots_cost_less_than_those_of_an_excerpt():
-    excerpt, whole = {"irradiance": 2}, {"irradiance": 60}
+    excerpt, whole = {"irradiance": 2, "shading": 4}, {"irradiance": 60, "shading": 480}
     ratios = Decoupled().cost_ratios(Settings(), 320 * 180, excerpt, whole, shots=2)
     settings = DecoupledSettings()
     expected = irradiance_spp(settings, 30) / irradiance_spp(settings, 2)
     same = dict.fromkeys(("prepass", "hash_grid"), 1.0)
+    same["shading"] = 0.5 + 0.5 * specular_spp(settings, 240) / specular_spp(settings, 4)
     assert expected < 0.3
     assert ratios == pytest.approx(same | {"irradiance": expected, "disocclusion": expected})
-    fixed = Settings().replace(DecoupledSettings, irradiance_spp=16)
+    fixed = Settings().replace(DecoupledSettings, irradiance_spp=16, specular_spp=8)
     assert set(Decoupled().cost_ratios(fixed, 320 * 180, excerpt, whole, shots=2).values()) == {1.0}
 
 
@@ -55,6 +61,7 @@ def test_light_of_large_frames_has_fewer_pixels():
     assert size(320, 180, virtual_camera) == (320, 180)
     assert size(1280, 720, virtual_camera) == size(3840, 2160, virtual_camera) == (1280, 720)
     assert size(1280, 720, irradiance_camera) == size(3840, 2160, irradiance_camera) == (1280, 720)
-    excerpt = {"irradiance": 2}
-    ratios = Decoupled().cost_ratios(Settings(), 3840 * 2160, excerpt, excerpt, shots=1)
+    excerpt = {"irradiance": 2, "shading": 4}
+    ratios = dict(Decoupled().cost_ratios(Settings(), 3840 * 2160, excerpt, excerpt, shots=1))
+    assert ratios.pop("shading") == 1.0
     assert set(ratios.values()) == {1.0 / 36.0}

@@ -33,6 +33,7 @@ def hash_grid_light(count):
     inputs = SimpleNamespace(record=lambda _, k: entries[k])
     segments = [Segment(k, k + SPACING) for k in keyframes[:-1]]
     shot = ShotContext(0, segments, inputs, walk, None, None)
+    assert shot.frames == len(path)
     grids = [shot.hash_grid(frame) for frame in range(len(path))]
     return np.array([np.array(grid.lookup(*at)[0])[0, 0] for grid in grids]), grids
 

@@ -15,7 +15,7 @@ from enfilade.methods.decoupled.irradiance import fill_disocclusions, gather_key
 from enfilade.methods.decoupled.light_camera import light_reduction
 from enfilade.methods.decoupled.prepass import trace_prepass
 from enfilade.methods.decoupled.records import IrradianceImage, ShadedFrame
-from enfilade.methods.decoupled.sample_counts import irradiance_spp
+from enfilade.methods.decoupled.sample_counts import irradiance_spp, specular_spp
 from enfilade.methods.decoupled.shading import shade
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.temporal import TemporalAccumulation, window
@@ -33,6 +33,7 @@ from enfilade.settings import (
 )
 
 SPACING = 8  # of keyframes, frames
+SPECULAR_SHARE = 0.5  # of the cost of an excerpt's shading, for forecasts: 0 without specular lobes
 
 
 @dataclass(frozen=True)
@@ -96,14 +97,19 @@ class Decoupled(Method):
         whole: Mapping[str, int],
         shots: int,
     ) -> Mapping[str, float]:
-        """Cached light of large frames has fewer pixels; shots with few keyframes need more paths."""
+        """Cached light of large frames has fewer pixels; short shots need more paths and specular rays."""
         share = 1.0 / light_reduction(pixels) ** 2
         ratios = dict.fromkeys(("prepass", "hash_grid", "irradiance", "disocclusion"), share)
         spp, in_excerpt = (
             irradiance_spp(settings[DecoupledSettings], keyframes)
             for keyframes in (whole["irradiance"] / shots, excerpt["irradiance"])
         )
-        return ratios | dict.fromkeys(("irradiance", "disocclusion"), share * spp / in_excerpt)
+        ratios |= dict.fromkeys(("irradiance", "disocclusion"), share * spp / in_excerpt)
+        spp, in_excerpt = (
+            specular_spp(settings[DecoupledSettings], frames)
+            for frames in (whole["shading"] / shots, excerpt["shading"])
+        )
+        return ratios | {"shading": 1.0 + SPECULAR_SHARE * (spp / in_excerpt - 1.0)}
 
     def tasks(self, analysis: Analysis) -> Iterable[Task]:
         """Tasks of keyframes, segments, and all frames."""

@@ -87,6 +87,11 @@ class ShotContext:
         assert isinstance(self.walk.renderer, LobeRenderer)  # noqa: S101  (`Decoupled.needs_lobes`)
         return self.walk.renderer
 
+    @property
+    def frames(self) -> int:
+        """Number of distinct frames."""
+        return self._distance(self.keyframes[0], self.keyframes[-1]) + 1
+
     def estimate(
         self,
         camera: Camera,

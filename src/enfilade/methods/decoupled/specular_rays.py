@@ -83,7 +83,7 @@ def shade_specular(
         layers=SPECULAR_AOVS,
         centred=is_centre,
     )
-    spp = specular_spp(shot.settings)
+    spp = specular_spp(shot.settings, shot.frames)
     estimate.add(spp)
     sampling.reduce_noise(estimate, where, is_narrow, spp)
     traced = [of.to_image(where) for of in estimate.shadings]

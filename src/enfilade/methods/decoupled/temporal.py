@@ -21,13 +21,13 @@ from enfilade.kernels.tone import REC709_LUMINANCE, luminance
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.edges import dilated
 from enfilade.methods.decoupled.records import ShadedFrame, SpecularAov
+from enfilade.methods.decoupled.sample_counts import REACH
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.surface_image import MIN_FOUND_WEIGHT, UploadedImage, lookup, upload_layers
 from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
 from enfilade.records import F32, Frame, Geometry, Mask, Provenance, SurfaceClass
 from enfilade.settings import ViewingSettings
 
-REACH = 3  # distinct frames to each side over which specular AOVs are accumulated
 MAX_DIFFERENCE = 3.0  # standard deviations, at which the weight of another frame falls to 1/e
 # Times the variance of a value, above which that of another frame lowers its weight: a dark pixel
 # beside a window is certain, and values of its edge in other frames are within their own large noise.
