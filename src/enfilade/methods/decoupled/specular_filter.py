@@ -60,7 +60,7 @@ def filter_spatially(
 
 
 def with_edges(aov: SpecularAov, edges: Shading, where: Mask) -> SpecularAov:
-    """An AOV with other values at its edges, to which other frames do not contribute.
+    """An AOV with other values at its edges, without deviation: other frames that differ count little there.
 
     Parameters
     ----------
