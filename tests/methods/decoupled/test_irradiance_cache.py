@@ -1,11 +1,12 @@
 """Irradiance images as they are uploaded: what is denoised stays as it is."""
 
+import drjit as dr
 import numpy as np
 import pytest
 
 from enfilade.arrays import image
 from enfilade.camera.pinhole import Camera, look_at
-from enfilade.methods.decoupled.irradiance_cache import accumulate, upload
+from enfilade.methods.decoupled.irradiance_cache import accumulate, reproject_to, upload
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.records import Geometry, Shading
 
@@ -13,8 +14,7 @@ H, W = 16, 24
 SPOT = 8, 12  # row, column of a bright pixel
 
 
-@pytest.mark.parametrize(("deviation", "is_kept"), [(0.0, True), (1.0, False)])
-def test_a_bright_pixel_of_a_denoised_image_is_no_firefly(deviation, is_kept):
+def wall_with_a_bright_pixel(deviation):
     camera = Camera(look_at((0, 0, 1), (0, 0, 0)), 50.0, W, H)
     normal = np.broadcast_to(np.float32((0, 0, 1)), (H, W, 3)).copy()
     ones = np.ones((H, W))
@@ -25,6 +25,23 @@ def test_a_bright_pixel_of_a_denoised_image_is_no_firefly(deviation, is_kept):
     color[SPOT] = 20.0
     dark = Shading(np.zeros((H, W, 3), np.float32), np.zeros((H, W), np.float32))
     light = Shading(color, np.full((H, W), deviation, np.float32))
-    uploaded = upload(geometry, IrradianceImage(dark, light, ones.astype(bool)))
-    found = image(accumulate(geometry, ones.astype(bool), [uploaded]).values[0], H, W)
+    return geometry, IrradianceImage(dark, light, ones.astype(bool))
+
+
+@pytest.mark.parametrize(("deviation", "is_kept"), [(0.0, True), (1.0, False)])
+def test_a_bright_pixel_of_a_denoised_image_is_no_firefly(deviation, is_kept):
+    geometry, irradiance = wall_with_a_bright_pixel(deviation)
+    uploaded = upload(geometry, irradiance)
+    found = image(accumulate(geometry, irradiance.is_known, [uploaded]).values[0], H, W)
     assert (found[SPOT][0] == pytest.approx(20.0, rel=0.01)) == is_kept
+
+
+@pytest.mark.parametrize("deviation", [0.0, 1.0])
+def test_only_variances_that_are_read_are_stored(deviation):
+    geometry, irradiance = wall_with_a_bright_pixel(deviation)
+    uploaded = upload(geometry, irradiance)
+    averaged = accumulate(geometry, irradiance.is_known, [uploaded])
+    reprojected = reproject_to(geometry, [averaged], [1.0])
+    lanes = [[dr.width(v) for v in of.variances] for of in (uploaded, averaged, reprojected)]
+    assert lanes == [[1, H * W if deviation else 1], [1], [1]]
+    np.testing.assert_allclose(np.array(reprojected.values[0]), np.array(averaged.values[0]), rtol=0.1)

@@ -111,7 +111,8 @@ def _mean(
 def upload(geometry: Geometry, irradiance: IrradianceImage) -> UploadedImage:
     """Upload an irradiance image in two layers, direct and indirect.
 
-    Fireflies of indirect light are redistributed. A denoised image, whose variance is 0, has none.
+    Fireflies of indirect light are redistributed. A denoised image, whose variance is 0, has none: a single
+    lane stands for its variances.
 
     Parameters
     ----------
@@ -119,11 +120,13 @@ def upload(geometry: Geometry, irradiance: IrradianceImage) -> UploadedImage:
         G-buffer of the image.
     irradiance
     """
-    indirect = lanes(irradiance.indirect.color), lanes(irradiance.indirect.variance)
+    direct, indirect = (
+        (lanes(of.color), lanes(of.variance) if of.variance.any() else Float(0))
+        for of in (irradiance.direct, irradiance.indirect)
+    )
     if irradiance.indirect.variance.any():
         guide = guide_of(geometry, np.where(irradiance.is_known, geometry.shape_index, np.uint32(0)))
         indirect = redistribute_fireflies(*indirect, guide, times=FIREFLY, levels=FIREFLY_LEVELS)
-    direct = lanes(irradiance.direct.color), lanes(irradiance.direct.variance)
     return upload_layers(geometry, lanes(irradiance.is_known), [direct, indirect])
 
 
@@ -146,7 +149,7 @@ def accumulate(geometry: Geometry, is_known: Mask, images: Sequence[UploadedImag
     Returns
     -------
     UploadedImage
-        One layer, direct plus indirect.
+        One layer, direct plus indirect, without variance: lookups do not read it.
     """
     layers, _ = _averaged(geometry, images, [1.0] * len(images))
     groups = np.where(is_known, geometry.shape_index, np.uint32(0))
@@ -154,8 +157,7 @@ def accumulate(geometry: Geometry, is_known: Mask, images: Sequence[UploadedImag
         smooth_along(geometry, groups, *layer) if np.array(layer[1]).any() else layer for layer in layers
     ]
     irradiance = sum((value for value, _ in smoothed), Array3f(0))
-    variance = sum((variance for _, variance in smoothed), Float(0))
-    return upload_layers(geometry, lanes(is_known), [(irradiance, variance)])
+    return upload_layers(geometry, lanes(is_known), [(irradiance, Float(0))])
 
 
 def reproject_to(
@@ -163,7 +165,7 @@ def reproject_to(
 ) -> UploadedImage:
     """Reproject irradiance images to a view: an image for the lookups of its camera rays."""
     layers, is_known = _averaged(geometry, images, weights)
-    return upload_layers(geometry, is_known, layers)
+    return upload_layers(geometry, is_known, [(value, Float(0)) for value, _ in layers])
 
 
 def is_covered(geometry: Geometry, images: Sequence[UploadedImage]) -> Mask:
@@ -213,5 +215,5 @@ def _averaged(
     is_known = valid > MIN_FOUND_WEIGHT
     values = [dr.select(is_known, total / weight, 0.0) for total in totals]
     variance = [dr.select(is_known, v / (weight * weight), 0.0) for v in variances]
-    dr.eval(values, variance, is_known)
+    dr.eval(values, is_known)
     return list(zip(values, variance, strict=True)), is_known

@@ -39,7 +39,7 @@ class UploadedImage:
         Of :func:`packed`; None where normals are not compared, as for virtual images.
     values : tuple of Array3f or Array3f16
     variances : tuple of Float
-        One a layer.
+        One a layer; a literal 0 where it has none.
     eye : Array3f
     direction_from_pixel, pixel_from_direction : Matrix3f
         Of the camera.
@@ -95,17 +95,18 @@ def upload_layers(
     is_known : Bool
         Pixels that have values, width * height lanes.
     layers
-        Values (Array3f) and variances of their luminance (Float), the same.
+        Values (Array3f) and variances of their luminance (Float), the same, or a literal 0.
     has_normals
         Whether normals are compared in lookups.
     """
     camera = geometry.camera
+    literal = dr.VarState.Literal
     uploaded = UploadedImage(
         depths=dr.select(is_known, lanes(geometry.depth), 0.0),
         shape_indices=dr.select(is_known, lanes(geometry.shape_index), 0),
         normals=packed(lanes(geometry.normal)) if has_normals else None,
         values=tuple(dr.select(is_known, value, 0.0) for value, _ in layers),
-        variances=tuple(dr.select(is_known, variance, 0.0) for _, variance in layers),
+        variances=tuple(v if v.state == literal else dr.select(is_known, v, 0.0) for _, v in layers),
         eye=vector3(camera.eye),
         direction_from_pixel=matrix3(camera.direction_from_pixel),
         pixel_from_direction=matrix3(camera.pixel_from_direction),
@@ -133,7 +134,7 @@ def blank_image() -> UploadedImage:
         shape_indices=zeros(UInt),
         normals=zeros(UInt),
         values=(zeros(Array3f),),
-        variances=(zeros(Float),),
+        variances=(Float(0),),
         eye=vector3(np.zeros(3)),
         direction_from_pixel=matrix3(nowhere),
         pixel_from_direction=matrix3(nowhere),  # all points are behind its camera
