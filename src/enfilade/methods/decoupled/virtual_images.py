@@ -11,10 +11,8 @@ from typing import Any
 
 import drjit as dr
 import numpy as np
-import numpy.typing as npt
 
 from enfilade.arrays import Array3f, Bool, Float, UInt, lanes, rows
-from enfilade.camera.pinhole import Camera
 from enfilade.kernels.random import one_sequence
 from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.kernels.replay import recorded
@@ -65,14 +63,15 @@ class VirtualImages:
         path = compact(path, path.lane)
         choice = Float(dr.select(dr.gather(UInt, lanes(lane), path.lane) < count, REFLECT, TRANSMIT))
         length = np.ones(2 * count, np.float32)  # of the path, in distances of the first surface
-        first = np.tile(geometry.depth.ravel() * _lengths(geometry.camera), 2)
+        first = np.array(dr.norm(rays.direction)) * geometry.depth.ravel()[lane % count]
         for ahead, next_shape, next_normal, distance, is_image, _ in self._interfaces(path, choice):
             # Replace the surface by the next one where the interface forms an image; rough glass forms none.
             shown = np.flatnonzero(np.array(is_image))
-            at = lane[np.array(ahead.lane)[shown]]
+            place = np.array(ahead.lane)[shown]
+            at = lane[place]
             shape_index[at] = np.array(next_shape)[shown] + IN_VIRTUAL_IMAGE
             normal[at] = rows(next_normal)[shown]
-            added = np.array(distance)[shown] / first[at]
+            added = np.array(distance)[shown] / first[place]
             length[at] = np.minimum(length[at] + added, SKY_DISTANCE)
         size = geometry.shape_index.shape
         images = zip(
@@ -164,11 +163,3 @@ class VirtualImages:
             Bool(is_image),
             Bool(forms_image),
         )
-
-
-def _lengths(camera: Camera) -> npt.NDArray[np.float32]:
-    """Lengths of the directions of unit depth through the centres of all pixels, (N,)."""
-    row, column = np.indices((camera.height, camera.width)).reshape(2, -1) + 0.5
-    directions = np.stack([column, row, np.ones_like(row)], axis=1) @ camera.direction_from_pixel.T
-    lengths: npt.NDArray[np.float32] = np.linalg.norm(directions, axis=1).astype(np.float32)
-    return lengths
