@@ -156,9 +156,12 @@ def test_the_luminance_is_that_of_all_layers_together(kind, layers):
     random = RandomKey(7, 3, Purpose.FILL)
     whole = kind(camera, pixels, radiance, paths_in_flight=1 << 20, random=random, layers=layers, **options)
     whole.add(6)
-    mean, variance = (np.array(of) for of in whole.luminance)
+    mean, variance = (np.array(of) for of in whole.luminance())
     np.testing.assert_allclose(mean, luminance(sum(of.color for of in whole.shadings)), rtol=1e-6)
     np.testing.assert_allclose(variance, sum(of.variance for of in whole.shadings), rtol=1e-6)
+    some = np.arange(len(pixels)) % 3 == 1
+    for of, chosen in zip((mean, variance), whole.luminance(some), strict=True):
+        np.testing.assert_array_equal(np.array(chosen), of[some])
 
 
 def test_an_empty_list_of_pixels_is_traced():

@@ -149,13 +149,20 @@ class Estimate:
         n, dropped = len(self._pixels), self.count.dropped
         return [Shading(rows(color)[:n], np.array(variance)[:n], dropped) for color, variance in found]
 
-    @property
-    def luminance(self) -> tuple[Any, Any]:
-        """Mean luminance of each pixel, of all layers together, and the sum of the layers' variances.
+    def luminance(self, where: npt.NDArray[np.bool_] | None = None) -> tuple[Any, Any]:
+        """Mean luminance of pixels, of all layers together, and the sum of the layers' variances.
 
-        Float, Float; a single lane where the list is empty.
+        Parameters
+        ----------
+        where : (N,) bool
+            Pixels of the list, one at least; None for all of them.
+
+        Returns
+        -------
+        mean, variance : Float
+            A single lane where the list is empty.
         """
-        means = self._means()
+        means = self._means(None if where is None or where.all() else np.flatnonzero(where).astype(np.uint32))
         color = sum((color for color, _ in means), Array3f(0))
         return dr.dot(color, Array3f(*REC709_LUMINANCE)), sum((variance for _, variance in means), Float(0))
 
@@ -196,12 +203,22 @@ class Estimate:
             dr.scatter_add(total, Float64(value), target, mode=dr.ReduceMode.NoConflicts)
         dr.eval(self._sums)
 
-    def _means(self) -> list[tuple[Any, Any]]:
-        """Mean colour (Array3f) and variance of the mean luminance (Float) of every layer."""
-        count = dr.maximum(self._sums[0], 1.0)
+    def _means(self, chosen: npt.NDArray[np.uint32] | None = None) -> list[tuple[Any, Any]]:
+        """Mean colour (Array3f) and variance of the mean luminance (Float) of every layer.
+
+        Parameters
+        ----------
+        chosen : (M,) uint32
+            Indices in the list of the pixels; None for all of them.
+        """
+        sums = self._sums
+        if chosen is not None:
+            index = lanes(chosen)
+            sums = [dr.gather(Float64, total, index) for total in sums]
+        count = dr.maximum(sums[0], 1.0)
         found = []
-        for first in range(2, len(self._sums), 4):
-            *mean, mean_square = (total / count for total in self._sums[first : first + 4])
+        for first in range(2, len(sums), 4):
+            *mean, mean_square = (total / count for total in sums[first : first + 4])
             luminance = sum(weight * channel for weight, channel in zip(REC709_LUMINANCE, mean, strict=True))
             sample_variance = dr.maximum(mean_square - luminance * luminance, 0.0)
             variance = dr.select(count > 1.0, sample_variance / dr.maximum(count - 1.0, 1.0), 0.0)

@@ -88,9 +88,10 @@ class ReconstructedEstimate(Estimate):
                 dr.scatter_add(total, value, target, mode=dr.ReduceMode.NoConflicts)
         dr.eval(self._weighted)
 
-    def _means(self) -> list[tuple[Any, Any]]:
+    def _means(self, chosen: npt.NDArray[np.uint32] | None = None) -> list[tuple[Any, Any]]:
         # Find the columns and rows of the pixels, and the variances of all pixels by themselves.
-        pixel = lanes(self._pixels) if len(self._pixels) else UInt(0)
+        pixels = self._pixels if chosen is None else self._pixels[chosen]
+        pixel = lanes(pixels) if len(pixels) else UInt(0)
         width, height = opaque(self._camera.width, Int), opaque(self._camera.height, Int)
         row = Int(pixel // UInt(width))
         column = Int(pixel) - row * width

@@ -19,12 +19,14 @@ H, W = 20, 30
 class Means:
     """An estimate of a mask of pixels, by their mean luminance and its variance, (H, W)."""
 
+    evaluated = 0  # pixels
+
     def __init__(self, sampled, mean, variance):
         self._of = [np.asarray(of, np.float32)[sampled] for of in (mean, variance)]
 
-    @property
-    def luminance(self):
-        return tuple(lanes(of) for of in self._of)
+    def luminance(self, where):
+        Means.evaluated += where.sum()
+        return tuple(lanes(of[where]) for of in self._of)
 
 
 class Noisy:
@@ -36,10 +38,9 @@ class Noisy:
     def add(self, spp, where):
         self._counts[self._sampled] += spp * where
 
-    @property
-    def luminance(self):
+    def luminance(self, where):
         variance = np.where(self._noisy, 2.0 / np.maximum(self._counts, 1), 0.0)
-        return Means(self._sampled, np.full((H, W), 1.0), variance).luminance
+        return Means(self._sampled, np.full((H, W), 1.0), variance).luminance(where)
 
 
 def deviations(low, high, exposure_ev=0.0):
@@ -65,7 +66,7 @@ def test_the_unseen_share_follows_the_rays_of_each_pixel():
         (0.9 * few, (False, True)),
         (1.1 * few, (False, False)),
     ):
-        found = AdaptiveSampling(128, tolerance, 0.0).uncertain(estimate, everywhere, counts)
+        found = AdaptiveSampling(128, tolerance, 0.0).uncertain(estimate, everywhere, counts=counts)
         assert (found[0, 0], found[0, 2]) == expected
 
 
@@ -84,7 +85,10 @@ def test_uncertain_pixels_agree_with_a_numpy_twin(exposure_ev):
     expected = 0.5 * (high - low)
     tolerance = float(np.median(expected))
     rays = AdaptiveSampling(128, tolerance, exposure_ev, beneath)
-    found = rays.uncertain(Means(sampled, mean, variance), sampled, counts)
+    found = rays.uncertain(Means(sampled, mean, variance), sampled, counts=counts)
+    some = sampled & (rng.uniform(size=(H, W)) < 0.3)
+    among = rays.uncertain(Means(sampled, mean, variance), sampled, some, counts)
+    np.testing.assert_array_equal(among, found & some)
     is_decided = abs(expected - tolerance) > 1e-5
     assert is_decided.mean() > 0.99
     np.testing.assert_array_equal(found[is_decided], (sampled & (expected > tolerance))[is_decided])
@@ -112,7 +116,8 @@ def test_a_bright_surface_beside_a_pixel_may_have_been_missed(sky, spp, is_uncer
     mean, everywhere = np.full((H, W), 0.2), np.ones((H, W), bool)
     mean[:, :10] = sky
     estimate = Means(everywhere, mean, np.zeros((H, W)))
-    found = AdaptiveSampling(128, 0.02, 0.0).uncertain(estimate, everywhere, np.full((H, W), spp, np.uint32))
+    counts = np.full((H, W), spp, np.uint32)
+    found = AdaptiveSampling(128, 0.02, 0.0).uncertain(estimate, everywhere, counts=counts)
     assert found[:, 10].all() == is_uncertain
     assert not found[:, 11:].any()  # no bright surface beside them
     assert not found[:, :10].any()
@@ -132,12 +137,15 @@ def test_rays_double_where_the_value_is_uncertain_and_beside_it():
 
     estimate = Noisy(sampled, traced, noisy)
     edges = noisy | (np.arange(W) == 20)
+    Means.evaluated = 0
     refined = AdaptiveSampling(most=100, tolerance=0.02, exposure_ev=0.0).refine(
         estimate, sampled, edges, sampled, 4
     )
     expected = np.where(dilated(noisy), 100 - 16, 0) + np.where(edges, 12, 0)
     np.testing.assert_array_equal(traced, expected)
     np.testing.assert_array_equal(refined, expected > 0)
+    # Edges and what is beside them, which is compared with them; then the noisy pixel with its neighbours.
+    assert Means.evaluated == dilated(edges).sum() + 3 * dilated(noisy, 2).sum()
 
 
 def test_edges_are_not_refined_beyond_the_largest_number_of_rays():
@@ -193,11 +201,10 @@ class Spikes:
     def mean(self):
         return self.BRIGHT * self._found / self.counts
 
-    @property
-    def luminance(self):
+    def luminance(self, where):
         share = self._found / self.counts
         variance = self.BRIGHT**2 * share * (1.0 - share) / (self.counts - 1.0)
-        return Means(np.ones(share.shape, bool), self.mean, variance).luminance
+        return Means(np.ones(share.shape, bool), self.mean, variance).luminance(where)
 
 
 @pytest.mark.parametrize(("beneath", "lost", "lost_otherwise"), [(0.5, 0.03, 0.25), (0.0, 0.3, 0.45)])

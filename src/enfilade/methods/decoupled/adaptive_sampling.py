@@ -65,7 +65,9 @@ class AdaptiveSampling:
         low, high = _extremes(lanes(luminance(color)), pixel, shape)
         return image(self._exceeds(low, high, pixel), *shape)
 
-    def uncertain(self, estimate: Estimate, sampled: Mask, counts: U32 | None = None) -> Mask:
+    def uncertain(
+        self, estimate: Estimate, sampled: Mask, among: Mask | None = None, counts: U32 | None = None
+    ) -> Mask:
         """Pixels whose displayed value is uncertain, (H, W).
 
         Their mean luminance has a deviation above the tolerance as it is displayed. Values above white count
@@ -75,25 +77,28 @@ class AdaptiveSampling:
         ----------
         estimate
             Of the pixels of `sampled`, row by row.
-        sampled : (H, W) bool
+        sampled, among : (H, W) bool
+            The latter: those of them that are evaluated; None: all.
         counts : (H, W) uint32
             Rays of each pixel, n, which may all have missed what makes the brightest pixel beside it bright.
             Its share is taken to be 1 / (n + 1), as by the rule of succession. None: no such share.
         """
         found = np.zeros_like(sampled)
-        if not sampled.any():
+        among = sampled if among is None else among
+        if not among.any():
             return found
-        mean, variance = estimate.luminance
+        evaluated = among if counts is None else sampled & dilated(among)
+        mean, variance = estimate.luminance(evaluated[sampled])
         dr.eval(mean, variance)
-        deviation, pixel = dr.sqrt(variance), lanes(np.flatnonzero(sampled).astype(np.uint32))
+        deviation, pixel = dr.sqrt(variance), lanes(np.flatnonzero(evaluated).astype(np.uint32))
         if counts is not None:
             means = dr.zeros(Float, sampled.size)
             dr.scatter(means, mean, pixel)
             _, brightest = _extremes(means, pixel, sampled.shape)
             rays = Float(dr.gather(UInt, lanes(counts), pixel))
             deviation = dr.maximum(deviation, (brightest - mean) / (1.0 + rays))
-        found[sampled] = np.array(self._exceeds(mean - deviation, mean + deviation, pixel))
-        return found
+        found[evaluated] = np.array(self._exceeds(mean - deviation, mean + deviation, pixel))
+        return found & among
 
     def _exceeds(self, low: Any, high: Any, pixel: Any) -> Any:
         """Whether two luminances of pixels (UInt, flat indices) differ by twice the tolerance; Bool."""
@@ -128,7 +133,7 @@ class AdaptiveSampling:
             spp += more
             counts[edges] += more
             refined |= edges
-            edges = within & dilated(edges & self.uncertain(estimate, sampled, counts))
+            edges = within & dilated(self.uncertain(estimate, sampled, edges, counts))
         return refined
 
     def reduce_noise(self, estimate: Estimate, sampled: Mask, within: Mask, spp: int) -> None:
@@ -145,9 +150,9 @@ class AdaptiveSampling:
         within : (H, W) bool
             Pixels of `sampled` that may have more rays.
         """
-        noisy = sampled
+        noisy = sampled & dilated(within)
         while spp < self.most:
-            noisy = within & beside(noisy & self.uncertain(estimate, sampled))
+            noisy = within & beside(self.uncertain(estimate, sampled, noisy))
             if not noisy.any():
                 return
             more = min(spp, self.most - spp)
