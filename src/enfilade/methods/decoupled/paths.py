@@ -158,7 +158,13 @@ class Contributions:
 
     def add(self, radiance: Any, lane: Any) -> None:
         """Add radiance (Array3f) to lanes (UInt), of which several paths may have the same."""
-        self._parts.append((radiance, lane))
+        # Leave out black paths, which are half of them.
+        wide = radiance + dr.zeros(Array3f, dr.width(lane))
+        chosen: Any = dr.compress(~dr.all(wide == 0.0))
+        if dr.width(chosen):
+            part = dr.gather(Array3f, wide, chosen), dr.gather(UInt, lane, chosen)
+            dr.eval(part)
+            self._parts.append(part)
 
     def summed(self) -> Any:
         """Sums of all lanes; Array3f.
@@ -168,16 +174,12 @@ class Contributions:
         """
         if not self._parts:
             return self._sum
-        dr.eval(self._parts)
-        parts = [(np.array(lane), radiance) for radiance, lane in self._parts]
-        lane = np.concatenate([lane for lane, _ in parts])
-        axes = [
-            np.concatenate(
-                [np.broadcast_to(np.array(radiance[axis]), lane.shape) for lane, radiance in parts]
-            )
-            for axis in range(3)
-        ]
-        sums = (lanes(np.bincount(lane, axis, self._count).astype(np.float32)) for axis in axes)
+        radiance, lane = joined(self._parts)
+        dr.eval(radiance, lane)  # all axes by one kernel
+        index = np.array(lane, np.intp)
+        sums = (
+            lanes(np.bincount(index, np.array(axis), self._count).astype(np.float32)) for axis in radiance
+        )
         return self._sum + Array3f(*sums)
 
 
