@@ -59,7 +59,7 @@ class Decoupled(Method):
     """Irradiance cached at keyframes; visibility, texture, edges and specular lobes in every frame."""
 
     name = "decoupled"
-    revision = 38
+    revision = 39
     needs_lobes = True
     settings = (TraceSettings, ViewingSettings, KeyframeSettings, DecoupledSettings)
     passes = (
