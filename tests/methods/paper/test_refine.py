@@ -1,5 +1,6 @@
 """Refinement: segments that are split, the keyframes that this inserts, and where it ends."""
 
+import json
 from functools import cache
 
 import drjit as dr
@@ -92,7 +93,7 @@ def test_segments_whose_keyframes_show_nothing_of_the_middle_are_split():
     )
     assert {(r.first, r.last) for r in results if r.is_split} == {(0, 4), (0, 2), (2, 4)}
     assert all(r.percent_visible is None for r in results)
-    table = results[0].to_table((1, 2, 3, 4, 5))
+    table = json.loads(json.dumps(results[0].to_table((1, 2, 3, 4, 5))))
     assert SegmentResult.from_table(table, (1, 2, 3, 4, 5)) == results[0]
 
 

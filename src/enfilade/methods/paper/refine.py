@@ -144,7 +144,7 @@ class Refinement:
         is_slow = slow_pixels(view.speed_deg_s, masks)
         is_masked = is_slow | specular_pixels(view.geometry, reusable)
         unmasked = is_compared & ~is_masked
-        is_disoccluded = ~is_masked & ~agreed[0] & ~agreed[1]
+        disoccluded = float((~is_masked & ~agreed[0] & ~agreed[1]).mean())
 
         # Compare without them: the metric's filters spread a difference over its neighbourhood.
         percent = percent_no_pursuit = None
@@ -157,7 +157,7 @@ class Refinement:
             reusable=reusable,
             percent_visible=percent,
             percent_visible_no_pursuit=percent_no_pursuit,
-            is_split=(percent or 0.0) > masks.split_percent or is_disoccluded.mean() > MOST_DISOCCLUDED,
+            is_split=(percent or 0.0) > masks.split_percent or disoccluded > MOST_DISOCCLUDED,
         )
 
     def _differences(
