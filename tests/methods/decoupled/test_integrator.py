@@ -174,14 +174,14 @@ def test_a_hash_grid_without_images_gives_its_light(diffuse):
     assert found.color.mean() == pytest.approx(reference.color.mean(), rel=0.05)
 
 
-def test_final_gathering_of_no_paths(diffuse):
+def test_no_paths_have_no_irradiance(diffuse):
     renderer, _ = diffuse
     pixels = pixels_of(front_camera())[:10]
     path = spawn(
         camera_rays(front_camera(), pixel_centres(front_camera(), lanes(pixels))), one_sequence(10), 0.0
     )
-    found = integrator_of(renderer).final_gather_of(EMPTY, compact(path, UInt()), lambda _: None, 10)
-    assert [rows(layer).tolist() for layer in found.layers] == [[[0.0] * 3] * 10] * 2
+    found = integrator_of(renderer).path_traced(EMPTY, compact(path, UInt()), 10)
+    assert rows(found).tolist() == [[0.0] * 3] * 10
 
 
 def test_metal_and_glass_have_no_diffuse_lobe(tmp_path):
