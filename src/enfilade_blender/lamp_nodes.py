@@ -9,7 +9,8 @@ import numpy as np
 
 from enfilade_blender.job import Job
 from enfilade_blender.materials.bake_scene import BakeScene
-from enfilade_blender.materials.graph import Graph, upstream
+from enfilade_blender.materials.graph import Graph
+from enfilade_blender.materials.links import upstream
 from enfilade_blender.materials.table import COLOUR_NODES
 from enfilade_blender.materials.values import Add, Constant, Emission, Mix, Nothing, Procedural, Shader, Value
 from enfilade_blender.notes import Notes

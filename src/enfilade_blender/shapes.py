@@ -12,7 +12,8 @@ from enfilade_blender.job import Job
 from enfilade_blender.materials.atlas import share_bsdfs
 from enfilade_blender.materials.bake import Bakery
 from enfilade_blender.materials.bsdfs import Context, is_one
-from enfilade_blender.materials.graph import Graph, is_of_object, is_of_place
+from enfilade_blender.materials.graph import Graph
+from enfilade_blender.materials.links import is_of_object, is_of_place
 from enfilade_blender.materials.surfaces import Surface, build
 from enfilade_blender.materials.textures import Textures, file_stem
 from enfilade_blender.materials.values import (

@@ -16,8 +16,8 @@ import numpy as np
 from enfilade_blender.image_files import F32
 from enfilade_blender.job import Job
 from enfilade_blender.materials.bake_scene import BakeKind, BakeScene
-from enfilade_blender.materials.graph import depends_on_place, is_of_view, upstream
 from enfilade_blender.materials.image_pixels import fault, is_missing
+from enfilade_blender.materials.links import depends_on_place, is_of_view, upstream
 from enfilade_blender.materials.stand_ins import IMAGES
 from enfilade_blender.materials.table import OBJECT_DATA, OBJECT_EFFECT
 from enfilade_blender.materials.textures import Textures
