@@ -42,6 +42,7 @@ class Motion:
         self._changed: dict[Any, None] = {}
         self._shown: set[str] = set()
         self._stride = 1
+        self._is_cut = False  # instances beyond those that are compared
 
     def look(self, frame: int) -> None:
         """Compare the frame that the scene is at; all are set in order, which steps simulations.
@@ -82,6 +83,13 @@ class Motion:
                 notes.add("not-carried", name, "Animation", "the change of its light is left out", effect)
         for name in exposures:
             notes.add("not-carried", name, "Exposure", "its animation is left out", effect)
+        if self._stride > 1 or self._is_cut:
+            what = (
+                f"motion is looked for in one of {self._stride} frames, and in {COMPARED} objects and copies"
+            )
+            notes.add(
+                "approximated", self._selection.scene.name, "Animation", what, "other motion is not noted"
+            )
         self._note_data(places, effect, notes)
 
     def _note_data(self, places: dict[str, None], effect: str, notes: Notes) -> None:
@@ -129,6 +137,7 @@ class Motion:
                 state["light", obj.name] = (), (obj.data.energy, *obj.data.color, *sizes)
             elif obj.type not in CARRYING:
                 state["shape", obj.name] = _bounds(obj.evaluated_get(graph))
+        self._is_cut |= len(graph.object_instances) > COMPARED
         for instance in islice(graph.object_instances, COMPARED):
             if not instance.is_instance or instance.parent.original.hide_render:
                 continue

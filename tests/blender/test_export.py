@@ -71,6 +71,27 @@ for note, items in ((note_depths, views), (note_falloff, lamps)):
     print(scene.count)
 """
 
+LOOKED_FOR = """
+import sys
+from types import SimpleNamespace
+sys.path.insert(0, sys.argv[1])
+import bpy
+from enfilade_blender import motion
+from enfilade_blender.notes import Notes
+scene = bpy.context.scene
+selection = SimpleNamespace(scene=scene, frames=(1, 10), objects=lambda: list(scene.objects))
+motion.check_generated = lambda *_: None
+def found():
+    notes, looked = Notes(), motion.Motion(selection, None)
+    for frame in range(1, 11):
+        scene.frame_set(frame)
+        looked.look(frame)
+    looked.note(notes)
+    return [note["what"] for note in notes.to_list() if note["node"] == "Animation"]
+print(found())
+setattr(motion, sys.argv[2], int(sys.argv[3]))
+print(found())
+"""
 WORKING_SPACES = """
 import sys
 from pathlib import Path
@@ -303,6 +324,18 @@ def test_other_working_spaces_of_blender_5_are_noted(blender):
     done = blender.run("-c", WORKING_SPACES, Path(enfilade_blender.__file__).parents[1])
     assert done.returncode == 0, done.stderr[-2000:]
     assert done.stdout.splitlines()[-2:] == ["[]", "['its working space ACEScg is left out']"]
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [("BUDGET", "54 frames, and in 100000 objects"), ("COMPARED", "1 frames, and in 1 objects")],
+)
+def test_motion_that_is_not_looked_for_is_told(blender, name, told):
+    done = blender.run("-c", LOOKED_FOR, Path(enfilade_blender.__file__).parents[1], name, 1)
+    assert done.returncode == 0, done.stderr[-2000:]
+    none, some = done.stdout.splitlines()[-2:]
+    assert none == "[]"
+    assert some == f"['motion is looked for in one of {told} and copies']"
 
 
 def test_constants_of_a_lamps_nodes_are_kept(exported):
