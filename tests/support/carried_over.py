@@ -165,6 +165,11 @@ OBJECTS = (
         "not carried",
         "as in the first frame",
     ),
+    (
+        "Motion in scenes of more than 100,000 objects and copies, or of many of them in many frames",
+        "approximated",
+        "looked for in a part of them, which a note tells",
+    ),
     ("Gamma, curves and white balance of the view", "not carried", "left out"),
     (
         "Limits of bounces",
