@@ -23,26 +23,26 @@ from studies.bench.page import results_page
 from studies.bench.suite import (
     GENERATED,
     LARGE_SCENES,
+    QUICK,
     QUICK_SCENES,
     found_in,
     generated,
     is_large_size,
-    only_for,
     run_case,
     summary,
 )
 from studies.bench.tables import print_table, ratio_text
 
-HERE = Path(__file__).resolve().parent
-FRAMES = 40  # of a walkthrough
-MEASURED, LARGE_MEASURED = 16, 8  # of them
+FRAMES, MEASURED = 40, 8  # of a walkthrough; of them
 REFERENCE_SPP, LARGE_REFERENCE_SPP = "512", "128"  # a window of a large image has 13 times as many pixels
 SEEDS = "3"  # of enfilade's configurations; one of large images and of the quick bench
 
 
 def main() -> int:
     """Run the bench on each scene and size; the exit status is 1 where one fails."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter, allow_abbrev=False
+    )
     parser.add_argument("--quick", action="store_true", help="two scenes, one size, few configurations")
     parser.add_argument(
         "--scene",
@@ -61,11 +61,13 @@ def main() -> int:
     parser.add_argument(
         "--measured",
         type=int,
-        default=None,
-        help=f"frames among them that are measured; {MEASURED} by default, {LARGE_MEASURED} of large images",
+        default=MEASURED,
+        help=f"frames among them that are measured; {MEASURED} by default",
     )
     parser.add_argument("--out", type=Path, default=Path("runs/bench"))
-    parser.add_argument("--keep", type=Path, default=HERE / "results", help="folder of the results")
+    parser.add_argument(
+        "--keep", type=Path, help="folder of the results; `results` in that of --out by default"
+    )
     arguments, options = parser.parse_known_args()
     sizes = arguments.sizes or (["320x180"] if arguments.quick else ["320x180", "1280x720"])
     benches: list[dict[str, Any]] = []
@@ -79,22 +81,27 @@ def main() -> int:
             cases += found_in(arguments.scenes) if arguments.scenes else []
         except EnfiladeError as error:
             parser.error(str(error))
-        measured = arguments.measured or (LARGE_MEASURED if is_large else MEASURED)
         defaults = ["--reference-spp", LARGE_REFERENCE_SPP if is_large else REFERENCE_SPP]  # a later one wins
         defaults += ["--seeds", "1" if is_large or arguments.quick else SEEDS]
         is_chosen = any(option.startswith("--only") for option in options)
-        only = () if is_chosen else only_for(size, is_quick=arguments.quick)
+        only = QUICK if arguments.quick and not is_chosen else ()
         for case in cases:
             try:
                 benches.append(
                     run_case(
-                        case, size, arguments.frames, measured, only, arguments.out, [*defaults, *options]
+                        case,
+                        size,
+                        arguments.frames,
+                        arguments.measured,
+                        only,
+                        arguments.out,
+                        [*defaults, *options],
                     )
                 )
             except EnfiladeError as error:
                 failed.append(str(error))
     if benches:
-        keep(benches, arguments.keep)
+        keep(benches, arguments.keep or arguments.out / "results")
     print("\n".join(failed), file=sys.stderr)
     return 1 if failed else 0
 
@@ -104,7 +111,7 @@ def keep(benches: list[dict[str, Any]], folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     means = summary(benches)
     file = folder / time.strftime("%Y-%m-%d-%H%M.json")
-    file.write_text(json.dumps({"summary": means, "benches": benches}, indent=1) + "\n")
+    file.write_text(json.dumps({"summary": means, "benches": benches}) + "\n")
     page = plot_page(benches, file.with_suffix(".png"))
     tables = file.with_suffix(".md")
     tables.write_text(results_page(benches, means, time.strftime("%Y-%m-%d")))

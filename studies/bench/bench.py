@@ -12,6 +12,7 @@ References are in a folder of their own; see `studies/bench/references.py`.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import resource
 import shutil
@@ -23,14 +24,19 @@ from typing import Any
 
 import numpy as np
 
+import enfilade.comparison.measures
+import enfilade.metric
+import studies.bench.measures
+import studies.bench.measuring
 from enfilade.cli.progress import watch
+from enfilade.cli.render import PATHS_PER_CPU_S
 from enfilade.device import Choice
 from enfilade.errors import InputError
 from enfilade.files import read_json, write_json
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.runs.delivery import ANALYSIS, CLIPS, VIDEO
 from enfilade.runs.folder import RunFolder
-from enfilade.runs.identity import digest_of
+from enfilade.runs.identity import RUN_FILE, digest_of
 from enfilade.runs.job import Job
 from enfilade.runs.render import render
 from enfilade.runs.statistics import add_costs
@@ -46,10 +52,17 @@ from studies.bench.windows import Window, draw_windows, windows_of
 from studies.progress import Prefixed
 from studies.versions import machine, origin, package_versions
 
-PATHS_PER_CPU_S = 6.0e5  # measured in six interiors on one core of 2026; for the forecast
 KERNELS = Path.home() / ".drjit"  # Dr.Jit's cache of compiled kernels
 UNCHARGED = (CLIPS.name, VIDEO.name)  # equal for all
 BASELINES_UNCHARGED = (*UNCHARGED, ANALYSIS.name)  # nor statistics of the path
+ATTEMPTS = 3  # at a run in which no kernel is compiled; then the tables say that some were
+# What the values depend on, beside the images.
+MEASURING = (
+    *Path(enfilade.metric.__file__).parent.glob("*.py"),
+    *Path(enfilade.comparison.measures.__file__).parent.glob("*.py"),
+    Path(studies.bench.measures.__file__),
+    Path(studies.bench.measuring.__file__),
+)
 DECIDED = 4.0 / 3.0  # times the error of the noise floor
 GBUFFER = "gbuffer"  # not charged to baselines that do not accumulate over time
 
@@ -219,11 +232,11 @@ class _Bench:
             "variant": one.variant,
             "pixel_filter": one.pixel_filter.value,
             "cost": mean_cost([run["cost"] for run in runs]),
-            "origin": runs[0]["origin"],
             "scores": {name: QUALITIES[name].score(values[name]) for name in self._names},
             "values": values,
             "seeds": [
-                {"seed": run["seed"], "cpu_s": run["cost"]["cpu_s"], "values": run["values"]} for run in runs
+                {name: run[name] for name in ("seed", "values", "origin")} | {"cpu_s": run["cost"]["cpu_s"]}
+                for run in runs
             ],
             "undecided": undecided(values, floor),
         }
@@ -273,6 +286,7 @@ class _Bench:
             **self._job.settings.to_tables([ViewingSettings]),
             "metering": self._job.settings[MetricSettings].metering.value,
             "versions": [package_versions(), colorvideovdp.version()],
+            "measuring": hashlib.sha256(b"".join(f.read_bytes() for f in sorted(MEASURING))).hexdigest(),
         }
         if is_filtered:
             identity["filter"] = list(GAUSSIAN_OF_BOX)
@@ -293,16 +307,18 @@ class _Bench:
         return {m: found["values"][m] for m in wanted}
 
     def _render(self, one: Configuration, folder: Path) -> None:
-        """Render in a new process, unless the run is finished; note the cost of starting it."""
+        """Render in a new process, unless it is done on such a machine; note the cost of the start."""
         file = self._folder / "costs" / f"{one.name}.json"
-        if _is_finished(one.job, folder) and file.is_file():
+        is_finished = _is_run_of(one.job, folder) and (folder / "summary.json").is_file()
+        if is_finished and file.is_file() and _is_of_here(read_json(file)["origin"]):
             return
-        before = _ledger_cpu_s(folder)
-        spent = alone("cpu", _render, one.job, folder, quiet=self._quiet)
-        if spent["kernels"]:  # now they are in the cache on disk
-            shutil.rmtree(folder)
-            before, spent = 0.0, alone("cpu", _render, one.job, folder, quiet=self._quiet)
-        spent["start_cpu_s"] = spent.pop("cpu_s") - (_ledger_cpu_s(folder) - before)
+        for _ in range(ATTEMPTS):
+            if _is_run_of(one.job, folder):  # costs of an interrupted run contain several starts
+                shutil.rmtree(folder)
+            spent = alone("cpu", _render, one.job, folder, quiet=self._quiet)
+            if not spent["kernels"]:  # else they are in the cache on disk now
+                break
+        spent["start_cpu_s"] = spent.pop("cpu_s") - _ledger_cpu_s(folder)
         write_json(file, {"cost": spent, "origin": {**origin(), "machine": machine()}})
 
     def _cost(self, one: Configuration, folder: Path) -> dict[str, Any]:
@@ -364,9 +380,7 @@ def undecided(values: Mapping[str, Sequence[float]], floors: Mapping[str, Sequen
 
 
 def _ledger_cpu_s(folder: Path) -> float:
-    """CPU seconds of all tasks of a run folder; 0 where there is none."""
-    if not (folder / "job.json").is_file():
-        return 0.0
+    """CPU seconds of all tasks of a run folder."""
     stages = add_costs(line["cost"] for line in RunFolder.read(folder).lines())
     return sum(spent["cpu_s"] for spent in stages.values())
 
@@ -378,11 +392,15 @@ def _uncharged(one: Configuration) -> tuple[str, ...]:
     return BASELINES_UNCHARGED if "accumulated" in one.variant else (*BASELINES_UNCHARGED, GBUFFER)
 
 
-def _is_finished(job: Job, folder: Path) -> bool:
-    """Whether a run folder holds the finished run of a job."""
-    if not (folder / "summary.json").is_file():
-        return False
-    return digest_of(RunFolder.read(folder).identity) == digest_of(job.identity())
+def _is_run_of(job: Job, folder: Path) -> bool:
+    """Whether a folder holds a run of a job, finished or not."""
+    is_run = (folder / RUN_FILE).is_file()
+    return is_run and digest_of(RunFolder.read(folder).identity) == digest_of(job.identity())
+
+
+def _is_of_here(found: Mapping[str, Any]) -> bool:
+    """Whether something was rendered on a machine like this one, by its origin."""
+    return all(found["machine"][name] == machine()[name] for name in ("processor", "cores"))
 
 
 def _render(job: Job, folder: Path, *, quiet: bool) -> dict[str, float]:

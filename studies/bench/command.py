@@ -18,34 +18,8 @@ if TYPE_CHECKING:
     from enfilade.runs.job import Job
 
 
-def _counts(_ctx: click.Context, _parameter: click.Parameter, text: str) -> tuple[int, ...]:
-    """Numbers of paths, written ``4,16,64``; ``none`` for no configuration."""
-    parts = [] if text.strip() == "none" else [part.strip() for part in text.split(",")]
-    if not all(part.isascii() and part.isdigit() and 0 < int(part) < 2**20 for part in parts):
-        raise click.BadParameter(f"{text!r} is not a list of numbers of paths; write it like 4,16,64")
-    return tuple(map(int, parts))
-
-
 @click.command("bench", short_help="Quality over CPU time of enfilade and baselines.")
 @path_options
-@click.option(
-    "--spp",
-    "traced",
-    callback=_counts,
-    metavar="N,N,...",
-    default="4,16,64,256",
-    show_default=True,
-    help="Paths a pixel of the path-traced configurations; none: leave them out.",
-)
-@click.option(
-    "--denoised-spp",
-    "denoised",
-    callback=_counts,
-    metavar="N,N,...",
-    default="1,2,4,8,16,32",
-    show_default=True,
-    help="Paths a pixel of the denoised configurations; none: leave them out.",
-)
 @click.option(
     "--reference-spp",
     type=click.IntRange(1, 1 << 20),
@@ -78,7 +52,7 @@ def _counts(_ctx: click.Context, _parameter: click.Parameter, text: str) -> tupl
     "--only",
     metavar="NAME",
     multiple=True,
-    help="Only configurations of this name, such as 'decoupled-*'; repeatable.",
+    help="This configuration, such as denoised-16 or decoupled-10, in place of the usual ones; repeatable.",
 )
 @click.option("--measure", "measures", metavar="NAME", multiple=True, help="Only this measure; repeatable.")
 @click.option(
@@ -105,8 +79,6 @@ def command(
     /,
     *,
     scene: Path,
-    traced: tuple[int, ...],
-    denoised: tuple[int, ...],
     only: tuple[str, ...],
     folder: Path,
     store: Path,
@@ -116,9 +88,9 @@ def command(
 ) -> None:
     """Compare enfilade's methods with baselines on SCENE (Mitsuba 3 XML), all on one path tracer.
 
-    The configurations are path tracing, path tracing denoised by Open Image Denoise, and the methods paper
-    and decoupled, each at several settings. Each renders whole frames in its own process, and is measured in
-    a few windows against a reference of the same pixel filter.
+    The usual configurations are path tracing denoised by Open Image Denoise, with several numbers of paths,
+    and the method decoupled at two qualities. Each renders whole frames in its own process, and is measured
+    in a few windows against a reference of the same pixel filter.
     The command writes bench.json, bench.png (quality over CPU time) and crops.png.
     """
     mark_resumable(ctx)
@@ -126,7 +98,7 @@ def command(
     from enfilade.camera import ranges
     from studies.bench.bench import Place, bench, forecast_s
     from studies.bench.charts import plot_bench
-    from studies.bench.configurations import all_configurations, selected
+    from studies.bench.configurations import configuration, default_names
     from studies.bench.pictures import plot_crops
     from studies.bench.references import References
     from studies.bench.windows import windows_of
@@ -136,8 +108,8 @@ def command(
     whole = job.path if walkthrough is None else _job(ctx, scene, **path | {"frames": walkthrough}).path
     if missing := sorted(set(job.path.numbers) - set(whole.numbers)):
         raise InputError(f"measured frames {ranges(missing)} are not among --walkthrough {walkthrough}")
-    known = all_configurations(job, traced=traced, denoised=denoised, walkthrough=whole)
-    configurations = selected(known, only)
+    names = dict.fromkeys(only or default_names(whole.width * whole.height))
+    configurations = [configuration(name, job, whole) for name in names]
     if not inputs["quiet"]:
         minutes = forecast_s(job, configurations, inputs["seeds"], len(os.sched_getaffinity(0))) / 60.0
         count = f"{len(configurations)} configurations"

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import fnmatch
-from collections.abc import Iterable, Mapping, Sequence
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,37 +20,30 @@ from enfilade.settings import (
 )
 from studies.bench.baselines import VARIANTS, DenoiserSettings
 
-FAMILIES = {  # in the order of tables: title
-    "traced": "path tracing",
-    "denoised": "path tracing, denoised",
-    "paper": "paper",
-    "decoupled": "decoupled",
-}
 BASELINES = {
     "traced": "reference",
     "denoised": "studies.bench.baselines:Denoised",
 }
-NO_SPLITS = {"split_percent": 100.0}
-PRESETS: dict[str, tuple[str, dict[str, dict[str, Any]]]] = {  # of enfilade's methods: settings that differ
-    "paper-16": ("paper", {"sampling": {"spp": 16}}),
-    "paper-16-unsplit": ("paper", {"sampling": {"spp": 16}, "masks": NO_SPLITS}),
-    **{
-        f"paper-16-uniform-{spacing}": (
-            "paper",
-            {
-                "sampling": {"spp": 16},
-                "keyframes": {"placement": "uniform", "spacing": spacing},
-                "masks": NO_SPLITS,
-            },
-        )
-        for spacing in (25, 12, 6)
-    },
-    **{
-        f"decoupled-{quality:g}": ("decoupled", {"decoupled": {"quality": quality}})
-        for quality in (60.0, 15.0, 10.0, 8.0)
-    },
-}
-EXPECTED_SPP = 8
+SMALL = (
+    *(f"denoised-{name}" for name in ("8", "16", "32", "32-followed", "64", "128", "8-accumulated-after")),
+    "decoupled-60", "decoupled-10",
+)  # fmt: skip
+LARGE = (
+    "denoised-8",
+    "denoised-8-fast",
+    "denoised-32",
+    "denoised-32-followed",
+    "decoupled-60",
+    "decoupled-10",
+)
+LARGE_PX = 500_000  # from this size on, few configurations
+NAME = re.compile(r"(traced|denoised|paper|decoupled)-(\d+(?:\.\d+)?)(?:-(.+))?")
+SEGMENTS = re.compile(r"unsplit|uniform-(\d+)")  # of paper: without refinement
+FORMS = (
+    "traced-N, denoised-N, {variants}, paper-N, paper-N-unsplit, paper-N-uniform-S and decoupled-Q, "
+    "with N paths a pixel, keyframes every S frames, and --quality Q"
+)
+EXPECTED_SPP = {"paper": 16, "decoupled": 32}  # in CPU time, for forecasts
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +55,7 @@ class Configuration:
     name : str
         Name, also of the run folder.
     family : str
-        One of :data:`FAMILIES`; its configurations form one curve.
+        ``traced``, ``denoised``, ``paper`` or ``decoupled``; its configurations form one curve.
     job : Job
     variant : str
         Of the denoised baseline: a name in :data:`VARIANTS`; empty for others.
@@ -90,8 +83,8 @@ class Configuration:
 
     @property
     def expected_spp(self) -> int:
-        """Rough number of paths a pixel, for forecasts: methods that reuse light trace about eight."""
-        return self.spp if self.family in ("traced", "denoised") else EXPECTED_SPP
+        """Number of paths a pixel that cost about as much, for forecasts."""
+        return EXPECTED_SPP.get(self.family, self.spp)
 
     @property
     def pixel_filter(self) -> SampleFilter:
@@ -99,32 +92,45 @@ class Configuration:
         return SampleFilter.BOX if self.family == "denoised" else SampleFilter.GAUSSIAN
 
 
-def all_configurations(
-    job: Job, *, traced: Iterable[int], denoised: Iterable[int], walkthrough: CameraPath | None = None
-) -> list[Configuration]:
-    """All configurations: baselines at the given spp, and the presets applied to the job's settings.
+def default_names(pixels: int) -> tuple[str, ...]:
+    """Names of the usual configurations for images of a number of pixels."""
+    return LARGE if pixels >= LARGE_PX else SMALL
+
+
+def configuration(name: str, job: Job, walkthrough: CameraPath | None = None) -> Configuration:
+    """The configuration of a name.
 
     Parameters
     ----------
+    name
+        See :data:`FORMS`.
     job
         Of the measured frames.
-    traced, denoised
-        Paths a pixel.
     walkthrough
-        Frames of the configurations that share data between frames, the measured ones among them; by default
+        Frames of a configuration that shares data between frames, the measured ones among them; by default
         these alone.
+
+    Raises
+    ------
+    SettingsError
+        There is none of that name, or the job's settings and its own contradict.
     """
+    matched = NAME.fullmatch(name)
+    family, number, variant = matched.groups("") if matched else ("", "", "")
+    is_paths = number.isdigit() and int(number) > 0
     whole = replace(job, path=walkthrough or job.path)
-    found = [_baseline("traced", f"traced-{n}", job, n) for n in sorted(set(traced))]
-    for n in sorted(set(denoised)):
-        for variant in VARIANTS:
-            name = f"denoised-{n}-{variant}".removesuffix("-")
+    match family:
+        case "traced" if is_paths and not variant:
+            return _baseline(name, family, job, int(number))
+        case "denoised" if is_paths and variant in VARIANTS:
             frames = whole if "accumulated" in variant else job
-            found.append(_baseline("denoised", name, frames, n, variant))
-    for name, (method, tables) in PRESETS.items():
-        preset = replace(whole, method=method, settings=_overridden(job.settings, tables))
-        found.append(Configuration(name, method, preset))
-    return found
+            return _baseline(name, family, frames, int(number), variant)
+        case "paper" if is_paths and (not variant or SEGMENTS.fullmatch(variant)):
+            return _method(name, family, whole, {"sampling": {"spp": int(number)}, **_segments(variant)})
+        case "decoupled" if not variant:
+            return _method(name, family, whole, {"decoupled": {"quality": float(number)}})
+    variants = ", ".join(f"denoised-N-{of}" for of in VARIANTS if of)
+    raise SettingsError(f"no configuration is called {name!r}; there are {FORMS.format(variants=variants)}")
 
 
 def with_seeds(one: Configuration, count: int) -> list[Configuration]:
@@ -143,18 +149,7 @@ def with_seeds(one: Configuration, count: int) -> list[Configuration]:
     ]
 
 
-def selected(configurations: Sequence[Configuration], patterns: Sequence[str]) -> list[Configuration]:
-    """Configurations whose names match a pattern, such as ``decoupled-*``; all without patterns."""
-    for pattern in patterns:
-        if not any(fnmatch.fnmatchcase(c.name, pattern) for c in configurations):
-            names = ", ".join(c.name for c in configurations)
-            raise SettingsError(f"no configuration is called {pattern!r}; there are: {names}")
-    return [
-        c for c in configurations if not patterns or any(fnmatch.fnmatchcase(c.name, p) for p in patterns)
-    ]
-
-
-def _baseline(family: str, name: str, job: Job, spp: int, variant: str = "") -> Configuration:
+def _baseline(name: str, family: str, job: Job, spp: int, variant: str = "") -> Configuration:
     settings = job.settings.replace(SamplingSettings, spp=spp).replace(OutputSettings, layers="none")
     if family == "denoised":
         settings = settings.replace(ReferenceSettings, pixel_filter=SampleFilter.BOX)
@@ -162,6 +157,17 @@ def _baseline(family: str, name: str, job: Job, spp: int, variant: str = "") -> 
     return Configuration(name, family, replace(job, method=BASELINES[family], settings=settings), variant)
 
 
-def _overridden(settings: Settings, tables: Mapping[str, Mapping[str, Any]]) -> Settings:
-    whole: dict[str, Any] = settings.to_tables()
-    return Settings.from_tables(whole | {name: whole[name] | dict(table) for name, table in tables.items()})
+def _method(name: str, family: str, job: Job, tables: Mapping[str, Mapping[str, Any]]) -> Configuration:
+    """One of enfilade's methods, with settings that differ from the job's."""
+    whole: dict[str, Any] = job.settings.to_tables()
+    settings = Settings.from_tables(whole | {of: whole[of] | dict(table) for of, table in tables.items()})
+    return Configuration(name, family, replace(job, method=family, settings=settings))
+
+
+def _segments(variant: str) -> dict[str, dict[str, Any]]:
+    """Settings of the paper's keyframes: without refinement, by Eq. 6 or uniform."""
+    if not variant:
+        return {}
+    _, _, spacing = variant.partition("uniform-")
+    uniform = {"keyframes": {"placement": "uniform", "spacing": int(spacing)}} if spacing else {}
+    return {"masks": {"split_percent": 100.0}, **uniform}

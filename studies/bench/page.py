@@ -7,7 +7,7 @@ from typing import Any
 
 from enfilade.camera import ranges
 from studies.bench.measures import QUALITIES
-from studies.bench.tables import number_text, ratio_text, score_text
+from studies.bench.tables import cost_text, ratio_text, score_text
 
 INTRODUCTION = """# Results of the bench, {date}
 
@@ -15,7 +15,7 @@ Written by `make bench`; the [bench's README](../README.md) defines baselines, c
 [scenes.toml](../scenes.toml) lists the splits. "times": CPU time of the best baseline at equal quality over
 that of the configuration, with a bootstrap interval of 90 % over windows and seeds; `≥`: no baseline is as
 good; `≤`: the cheapest one is as good; `~`: a mean of bounds of both kinds. `*`: within the noise of the
-references."""
+references. `†`: kernels were compiled in the run, so that its CPU time is too high."""
 
 
 def results_page(benches: Sequence[Mapping[str, Any]], means: Sequence[Mapping[str, Any]], date: str) -> str:
@@ -53,7 +53,7 @@ def results_page(benches: Sequence[Mapping[str, Any]], means: Sequence[Mapping[s
 
 def _circumstances(found: Mapping[str, Any]) -> str:
     """One line on frames, references, software and machines."""
-    origins = [row["origin"] for row in found["configurations"]]
+    origins = [run["origin"] for row in found["configurations"] for run in row["seeds"]]
     code = ", ".join(sorted({f"{of['date']} ({of['commit']})" for of in origins}))
     machines = ", ".join(
         sorted({f"{of['machine']['cores']} cores, {of['machine']['processor']}" for of in origins})
@@ -74,7 +74,7 @@ def _rows(found: Mapping[str, Any]) -> Iterator[list[str]]:
             for name in names
         )
         cost = row["cost"]
-        yield [f"`{row['name']}`", number_text(cost["cpu_s"] / frames), f"{cost['peak_mib']:.0f}", *scores]
+        yield [f"`{row['name']}`", cost_text(cost, frames), f"{cost['peak_mib']:.0f}", *scores]
     for configuration, by_measure in found["ratios"].items():
         yield [f"times, `{configuration}`", "", "", *(ratio_text(by_measure[name]) for name in names)]
     floor = found["reference"]["noise_floor"]

@@ -13,20 +13,14 @@ from typing import Any
 
 from enfilade.camera import load_path
 from enfilade.errors import EnfiladeError, SceneError
+from studies.bench.configurations import LARGE_PX
 from studies.bench.ratios import mean_ratio
 from studies.bench.splits import UNLISTED, split_of
 from studies.scenes import SCENES
 
 PIXEL_M = 0.25 / 800.0  # pitch of the paper's screen, 640x480 on 25 cm: 28 pixels per degree at 0.5 m
 FIRST_FRAME = 11  # of the measured ones, where the path is long enough
-LARGE_PX = 500_000  # from this size on, few frames and configurations
-SMALL = (
-    *(f"denoised-{name}" for name in ("8", "16", "32", "64", "128", "8-accumulated-after")),
-    "paper-16", "decoupled-60", "decoupled-10",
-)  # fmt: skip
-LARGE = ("denoised-8", "denoised-8-fast", "denoised-32", "decoupled-60", "decoupled-10")
 QUICK = ("denoised-4", "denoised-16", "denoised-64", "decoupled-60", "decoupled-10")
-DENOISED_SPP = "4,8,16,32,64,128"  # those that any of them names
 
 
 @dataclass(frozen=True)
@@ -104,7 +98,7 @@ def run_case(
     measured
         Number of consecutive frames that are measured.
     only
-        Configurations, see :func:`only_for`.
+        Names of configurations; empty: those of the size.
     out
         Folder of the benches.
     options
@@ -122,10 +116,10 @@ def run_case(
     folder = out / f"{case.name}-{size}-{frames}"
     command = [
         sys.executable, "-m", "studies", "bench", str(case.scene), "--path", str(case.path),
-        "--out", str(folder), "--denoised-spp", DENOISED_SPP,
+        "--out", str(folder),
         "--size", size, "--walkthrough", f"1-{frames}", "--frames", f"{max(last - measured + 1, 1)}-{last}",
         "--set", f"viewing.diagonal_m={math.hypot(width, height) * PIXEL_M}",
-        *(word for pattern in only for word in ("--only", pattern)), *options,
+        *(word for name in only for word in ("--only", name)), *options,
     ]  # fmt: skip
     if subprocess.run(command, check=False).returncode:
         raise EnfiladeError(f"the bench of {case.name} at {size} failed; the same command continues")
@@ -134,16 +128,9 @@ def run_case(
 
 
 def is_large_size(size: str) -> bool:
-    """Whether images of a size, such as ``1280x720``, have few frames and configurations."""
+    """Whether images of a size, such as ``1280x720``, have few configurations."""
     width, height = map(int, size.split("x"))
     return width * height >= LARGE_PX
-
-
-def only_for(size: str, *, is_quick: bool) -> tuple[str, ...]:
-    """Configurations of a size."""
-    if is_quick:
-        return QUICK
-    return LARGE if is_large_size(size) else SMALL
 
 
 def summary(benches: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -40,20 +40,22 @@ def _configurations(found: Mapping[str, Any]) -> Table:
         if family not in (None, row["family"]):
             table.add_section()
         family, cost = row["family"], row["cost"]
-        cells = [cost["cpu_s"] / frames, cost["start_cpu_s"], cost["wall_s"] / frames, cost["peak_mib"]]
+        times = [cost["start_cpu_s"], cost["wall_s"] / frames, cost["peak_mib"]]
+        cells = [cost_text(cost, frames), *map(number_text, times)]
         scores = (score_text(name, row["values"][name]) for name in measures)
         marked = (
             f"{text} *" if name in row["undecided"] else text
             for name, text in zip(measures, scores, strict=True)
         )
-        table.add_row(row["name"], *map(number_text, cells), *marked)
+        table.add_row(row["name"], *cells, *marked)
     table.add_section()
     floor = found["reference"]["noise_floor"]
     texts = (score_text(name, floor[name]) if name in floor else "" for name in measures)
     table.add_row("noise floor", "", "", "", "", *texts)
     table.caption = (
         f"means of {len(found['windows'])} windows; references of {found['reference']['spp']} paths in two "
-        "halves; floor: one half against the other; *: error less than a third above it, not decided"
+        "halves; floor: one half against the other; *: error less than a third above it, not decided; "
+        "†: kernels were compiled in the run"
     )
     return table
 
@@ -79,6 +81,11 @@ def ratio_text(ratio: Mapping[str, Any]) -> str:
     low, high = number_text(ratio["low"]), number_text(ratio["high"])
     mark = "" if ratio["is_decided"] else " *"
     return f"{SIGNS[ratio['kind']]}{number_text(ratio['times'])} [{low}, {high}]{mark}"
+
+
+def cost_text(cost: Mapping[str, Any], frames: int) -> str:
+    """CPU seconds a frame; a dagger where they contain the compilation of kernels."""
+    return number_text(cost["cpu_s"] / frames) + (" †" if cost["kernels"] else "")
 
 
 def score_text(measure: str, values: list[float]) -> str:

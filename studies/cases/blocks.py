@@ -116,12 +116,6 @@ def _times(results: Values, extent: Extent, _folder: Path, _figures: Path) -> Bl
         "above 1 JND, %",
     )  # fmt: skip
     rows = [_time_row(scene, method, result) for scene, result in results.items() for method in METHODS]
-    stages = [
-        (scene, METHODS[method], stage, f"{spent['cpu_s']:.3f}")
-        for scene, result in results.items()
-        for method in REUSING
-        for stage, spent in result["methods"][method]["stages"].items()
-    ]
     series = [
         (scene, row["spp"], *(f"{_mean(row['frames'], key):.2f}" for key in ("score", "visible_percent")))
         for scene, result in results.items()
@@ -138,7 +132,6 @@ def _times(results: Values, extent: Extent, _folder: Path, _figures: Path) -> Bl
     ]
     tables = (
         _table(("scene", "equal quality to", "ART, paths", "time ratio", "paper"), _equal_rows(results)),
-        _table(("scene", "method", "stage", "CPU, s"), stages),
         _table(("scene", "ART, paths", "JND", "above 1 JND, %"), series),
     )
     return _block([_size(extent), _table(heads, rows), *notes, *tables], [])

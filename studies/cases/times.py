@@ -42,8 +42,8 @@ def measure(case: Case) -> dict[str, Any]:
         ``methods``: for ``art``, ``rt``, ``ibr_rt`` and ``decoupled`` wall and CPU seconds of a frame
         (``wall_s``, ``cpu_s``), the number of paths of ART a pixel of the same CPU time
         (``equivalent_paths``), ``spp``, for each of ``frames`` the ``score`` and ``visible_percent`` against
-        the reference in the crop, by the paper's metric in motion, and the ``stages``. Seconds of ``art`` and
-        ``rt`` were measured together with ``ibr_rt``. ``art_series``: scores of ART by spp.
+        the reference in the crop, by the paper's metric in motion. Seconds of ``art`` and ``rt`` were
+        measured together with ``ibr_rt``. ``art_series``: scores of ART by spp.
         ``art_is_bound``: whether even the largest spp has visible differences. ``path_us``: wall and CPU
         microseconds of a path, by pixel filter.
     """
@@ -160,9 +160,6 @@ def _scaled(path_s: dict[str, float], paths: int) -> dict[str, float]:
 
 
 def _per_frame(summary: dict[str, Any]) -> dict[str, Any]:
-    """Seconds of a frame, in total and by stage, from the ledger."""
+    """Seconds of a frame, from the ledger."""
     count, spent = summary["frames"], summary["time_s"]
-    stages = {
-        name: {kind: seconds / count for kind, seconds in of.items()} for name, of in spent["stages"].items()
-    }
-    return {"wall_s": spent["total_s"] / count, "cpu_s": spent["cpu_s"] / count, "stages": stages}
+    return {"wall_s": spent["total_s"] / count, "cpu_s": spent["cpu_s"] / count}

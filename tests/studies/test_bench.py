@@ -10,6 +10,7 @@ from click.testing import CliRunner
 from enfilade.errors import SettingsError
 from enfilade.images import read_exr
 from enfilade.kernels.estimate import GAUSSIAN_RADIUS_PX, GAUSSIAN_SIGMA_PX
+from enfilade.runs.folder import RunFolder
 from enfilade.settings import (
     DecoupledSettings,
     KeyframeSettings,
@@ -20,13 +21,13 @@ from enfilade.settings import (
 )
 from studies.__main__ import main
 from studies.bench.baselines import DenoiserSettings
-from studies.bench.bench import extrapolated, mean_cost, undecided
-from studies.bench.configurations import all_configurations, selected
+from studies.bench.bench import _Bench, extrapolated, mean_cost, undecided
+from studies.bench.configurations import configuration
 from studies.bench.measures import QUALITIES
 from studies.bench.measuring import FLIP_IS_MISSING, available, gaussian_of_box
 from studies.bench.page import results_page
 from studies.bench.suite import summary
-from studies.bench.tables import bench_tables
+from studies.bench.tables import bench_tables, cost_text
 from support.console import as_text
 from support.study_runs import room_files, room_job
 
@@ -44,7 +45,7 @@ def frames_of(run):
 def line(tmp_path_factory):
     """Arguments of a bench of three of four frames, 48x36; its folder is the last one."""
     folder = tmp_path_factory.mktemp("bench")
-    flags = ("--spp", "1,4", "--denoised-spp", "2", "--reference-spp", 64, "--json", "--quiet")
+    flags = ("--reference-spp", 64, "--json", "--quiet")
     flags += ("--set", "masks.slow_deg_s=0.4")  # of a section that some configurations read
     flags += ("--seeds", 2, "--frames", "2-4", "--walkthrough", "1-4")
     only = [word for name in (*NAMES, SEEDED) for word in ("--only", name)]
@@ -164,7 +165,15 @@ def test_finished_configurations_are_not_rendered_again(held, line, run):
     other = run(*line, "--seed", "7")
     assert other.exit_code == 2
     assert "holds another run" in other.stderr
-    # A run that lost a frame is finished, to the same end.
+    # A run of another machine, whose CPU time does not compare, is rendered again.
+    file = folder / "costs" / "traced-4.json"
+    cost = json.loads(file.read_text())
+    file.write_text(json.dumps(cost | {"origin": {"machine": {"processor": "another", "cores": 2}}}))
+    rendered = next((folder / "configurations" / "traced-4" / "frames").glob("*.exr"))
+    run(*line)
+    assert rendered.stat().st_mtime_ns != made[rendered]
+    assert json.loads(file.read_text())["origin"] == cost["origin"]
+    # So is a run that was interrupted, to the same end.
     lost = next((folder / "configurations" / "traced-4" / "frames").glob("*.exr"))
     lost.unlink()
     (folder / "configurations" / "traced-4" / "summary.json").unlink()
@@ -174,23 +183,40 @@ def test_finished_configurations_are_not_rendered_again(held, line, run):
     assert scores[0] == scores[1]
 
 
+@pytest.mark.parametrize(("compiled", "runs"), [((0,), 1), ((40, 3, 0), 3), ((40, 3, 2), 3)])
+def test_a_run_that_compiles_kernels_is_repeated(tmp_path, monkeypatch, compiled, runs):
+    """Up to three times; then the tables say so."""
+    job = room_job(tmp_path, 2)
+    left = list(compiled)
+
+    def rendered(device, function, job, folder, **options):
+        assert not folder.exists()
+        with RunFolder.create(folder, job.identity()):
+            pass
+        return {"cpu_s": 2.0, "kernels": left.pop(0), "peak_mib": 1.0}
+
+    monkeypatch.setattr("studies.bench.bench.alone", rendered)
+    one = configuration("traced-1", job)
+    _Bench(one.job, 2, tmp_path, None, (), (), quiet=True)._render(one, tmp_path / "run")
+    assert len(compiled) - len(left) == runs
+    cost = json.loads((tmp_path / "costs" / "traced-1.json").read_text())["cost"]
+    assert cost_text(cost | {"cpu_s": 2.0}, 2) == ("1.00 †" if compiled[-1] else "1.00")
+
+
 def test_measured_frames_are_some_of_the_walkthrough(run, line):
     result = run(*line, "--walkthrough", "3-4")
     assert result.exit_code == 2
     assert "measured frames 2 are not among --walkthrough 3-4" in result.stderr
 
 
-@pytest.mark.parametrize("counts", ["4,x", "0", "-1", "", "4,,8", "²"])
-def test_wrong_lists_of_paths_are_refused(run, line, counts):
-    result = run(*line, "--spp", counts)
+@pytest.mark.parametrize("name", ["best", "denoised", "denoised-0", "denoised-2.5", "denoised-2-slow",
+                                  "traced-4-fast", "paper-16-uniform", "decoupled-10-fast"])  # fmt: skip
+def test_an_unknown_configuration_is_refused(run, line, name):
+    result = run(*line, "--only", name)
     assert result.exit_code == 2
-    assert "write it like 4,16,64" in result.output
-
-
-def test_an_unknown_configuration_is_refused(run, line):
-    result = run(*line, "--only", "best")
-    assert result.exit_code == 2
-    assert "no configuration is called 'best'; there are: traced-1" in result.stderr
+    assert f"no configuration is called '{name}'; there are traced-N, denoised-N, denoised-N-fast" in (
+        " ".join(result.stderr.split())
+    )
 
 
 def test_missing_measures_are_reported(tmp_path, monkeypatch):
@@ -224,23 +250,18 @@ def test_a_single_frame_has_no_changes_to_measure(tmp_path):
     assert set(names) < set(QUALITIES)
 
 
-def test_all_configurations(tmp_path):
-    found = all_configurations(room_job(tmp_path, 2), traced=(4, 1), denoised=(2,))
-    names = [c.name for c in found]
-    variants = ("", "-fast", "-followed", "-accumulated", "-accumulated-fast", "-accumulated-after")
-    assert names[:8] == ["traced-1", "traced-4", *(f"denoised-2{v}" for v in variants)]
-    assert [c.name for c in selected(found, ["traced-*", "paper-16"])] == ["traced-1", "traced-4", "paper-16"]
-    denoised, accumulated, paper, decoupled = (
-        found[names.index(name)]
-        for name in ("denoised-2-fast", "denoised-2-accumulated", "paper-16", "decoupled-15")
-    )
+def test_configurations_by_name(tmp_path):
+    job = room_job(tmp_path, 2)
+    names = ("denoised-2-fast", "denoised-2-accumulated", "paper-16", "decoupled-7.5")
+    denoised, accumulated, paper, decoupled = (configuration(name, job) for name in names)
     assert (denoised.job.settings[DenoiserSettings].quality, accumulated.variant) == ("fast", "accumulated")
     assert accumulated.job.settings[DenoiserSettings].accumulation == "before"
     assert denoised.job.settings[ReferenceSettings].pixel_filter is denoised.pixel_filter is SampleFilter.BOX
     assert (denoised.spp, paper.spp) == (2, 16)
-    assert decoupled.job.settings[DecoupledSettings].quality == 15.0
+    assert decoupled.job.settings[DecoupledSettings].quality == 7.5
     assert not decoupled.is_baseline
-    unsplit, uniform = (found[names.index(f"paper-16-{name}")].job for name in ("unsplit", "uniform-6"))
+    unsplit, uniform = (configuration(f"paper-16-{name}", job).job for name in ("unsplit", "uniform-6"))
     assert unsplit.settings[MaskSettings].split_percent == 100.0
+    assert unsplit.settings[KeyframeSettings] == job.settings[KeyframeSettings]
     assert uniform.settings[KeyframeSettings].placement is Placement.UNIFORM
     assert uniform.settings[KeyframeSettings].spacing == 6

@@ -3,17 +3,13 @@
 import pytest
 
 from enfilade.errors import SceneError
-from studies.bench.configurations import all_configurations, selected
+from studies.bench.configurations import LARGE, SMALL, configuration, default_names
 from studies.bench.splits import split_of, splits
 from studies.bench.suite import (
-    DENOISED_SPP,
     GENERATED,
-    LARGE,
     QUICK,
     QUICK_SCENES,
-    SMALL,
     found_in,
-    only_for,
     summary,
 )
 from support.study_runs import room_job
@@ -47,14 +43,11 @@ def test_scenes_of_a_folder(tmp_path):
 
 
 def test_configurations_of_the_suite_exist(tmp_path):
-    known = all_configurations(
-        room_job(tmp_path, 2), traced=(4,), denoised=[int(spp) for spp in DENOISED_SPP.split(",")]
-    )
-    for patterns in (SMALL, LARGE, QUICK):
-        assert len(selected(known, patterns)) >= len(patterns)
-    assert only_for("320x180", is_quick=False) == SMALL
-    assert only_for("1280x720", is_quick=False) == LARGE
-    assert only_for("1280x720", is_quick=True) == QUICK
+    job = room_job(tmp_path, 2)
+    for names in (SMALL, LARGE, QUICK):
+        assert [configuration(name, job).name for name in names] == list(names)
+    assert default_names(320 * 180) == SMALL
+    assert default_names(1280 * 720) == LARGE
 
 
 def test_the_summary_has_a_mean_for_each_size_split_and_configuration():

@@ -234,8 +234,6 @@ def test_all_items_agree_with_each_other(results):
     methods = found["times"]["methods"]
     assert all(method["cpu_s"] > 0.0 and method["equivalent_paths"] > 0.0 for method in methods.values())
     assert methods["art"]["spp"] == 8
-    stages = [spent["cpu_s"] for spent in methods["ibr_rt"]["stages"].values()]
-    assert sum(stages) == pytest.approx(methods["ibr_rt"]["cpu_s"])
     assert [row["spp"] for row in found["times"]["art_series"]] == [4, 8]
     assert found["reflections"]["frames"]
     assert found["threshold"]["traced"]["spp"] == 4
