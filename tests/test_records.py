@@ -1,6 +1,8 @@
 """Records check their shapes, and know a little of themselves."""
 
 import dataclasses
+import json
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -109,6 +111,16 @@ def test_a_path_falls_into_shots():
     assert path.shots() == [range(2), range(2, 5), range(5, 6)]
     assert (len(path), path.width, path.height) == (6, W, H)
     assert CameraPath((CAMERA,), (1,), 24.0).shots() == [range(1)]
+
+
+def test_numbers_of_numpy_become_plain_ones():
+    """JSON has no others: identities and job descriptions could not be written."""
+    pose = np.eye(4, dtype=np.float32)
+    camera = Camera(pose, np.float32(50.0), np.int64(64), np.int32(36), tuple(np.float32([0.5, 0.25])))
+    path = CameraPath((camera,) * 2, tuple(np.arange(2)), Fraction(24), frozenset(np.arange(1, 2)))
+    numbers = [camera.fov_deg, camera.width, camera.height, *camera.principal_point]
+    numbers += [*path.numbers, path.fps, *path.cuts]
+    assert json.loads(json.dumps(numbers)) == [50.0, 64, 36, 0.5, 0.25, 0, 1, 24.0, 1]
 
 
 @pytest.mark.parametrize(

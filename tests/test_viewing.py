@@ -58,6 +58,11 @@ def test_out_of_range_is_refused_by_name(field, number):
         Viewing(**numbers)
 
 
+def test_distances_in_centimetres_are_refused():
+    with pytest.raises(InputError, match=r"distance_m = 60 .* 9228 pixels in a degree.*metres"):
+        Viewing(1920, 1080, distance_m=60.0)
+
+
 @pytest.mark.parametrize("display", DISPLAYS, ids=lambda d: d.name)
 def test_displays_show_pixel_for_pixel(display):
     whole = display.viewing(display.width_px, display.height_px, 60.0)

@@ -190,7 +190,7 @@ def read_json(file: Path) -> Any:
     except OSError as error:
         raise RunFolderError(f"can't read {file}: {error.strerror}") from error
     except (ValueError, RecursionError) as error:
-        raise RunFolderError(f"{file} is damaged ({error}); delete it or its folder") from error
+        raise RunFolderError(f"{file} is damaged ({error}); run the command that made it again") from error
 
 
 def unwritable(file: Path, error: OSError) -> EnfiladeError:
@@ -198,7 +198,7 @@ def unwritable(file: Path, error: OSError) -> EnfiladeError:
     reason, again = error.strerror or str(error), "then run the same command again: finished files are kept"
     if is_full(error):
         return NoSpaceError(f"can't write {file}: no room on the disk ({reason}); make room, {again}")
-    remedy = "check its disk" if is_passing(error) else "make room or choose another folder"
+    remedy = "check its disk" if is_passing(error) else "check its permissions, or choose another folder"
     return RunFolderError(f"can't write {file}: {reason}; {remedy}, {again}")
 
 

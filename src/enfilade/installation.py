@@ -11,12 +11,14 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from packaging.requirements import Requirement
+
 from enfilade import __version__
 from enfilade.device import INSTALL_LLVM, LLVM_MINIMUM, NO_GPU, Choice, activate, load, why_no_gpu
 from enfilade.errors import DeviceError, SceneError
 from enfilade.scene.blender.find import SCRIPT, find_blender
 
-_REQUIREMENT = re.compile(r"^\s*([A-Za-z0-9._-]+)(.*?)(?:;.*extra\s*==\s*['\"]([^'\"]+)['\"].*)?$")
+EXTRA = re.compile(r"extra == ['\"](.+?)['\"]")  # in a marker
 
 
 @dataclass(frozen=True)
@@ -72,16 +74,16 @@ def examine(choice: Choice = "auto") -> list[Check]:
 
 
 def _packages() -> Iterator[Check]:
-    for requirement in importlib.metadata.requires("enfilade") or []:
-        match = _REQUIREMENT.match(requirement)
-        if match is None:
-            continue
-        name, _, extra = match.groups()
+    for requirement in map(Requirement, importlib.metadata.requires("enfilade") or []):
+        extra = next(iter(EXTRA.findall(str(requirement.marker))), None)
+        wanted = f"{requirement.name}{requirement.specifier}"
         try:
-            found, remedy = importlib.metadata.version(name), ""
+            found = importlib.metadata.version(requirement.name)
         except importlib.metadata.PackageNotFoundError:
-            found, remedy = "", f"pip install '{requirement.partition(';')[0].strip()}'"
-        yield Check(f"{name} (extra {extra})" if extra else name, found, extra is None, remedy)
+            found = ""
+        is_right = bool(found) and requirement.specifier.contains(found, prereleases=True)
+        name = f"{requirement.name} (extra {extra})" if extra else requirement.name
+        yield Check(name, found, extra is None, "" if is_right else f"pip install '{wanted}'")
 
 
 def _devices(choice: Choice) -> Iterator[Check]:

@@ -249,8 +249,6 @@ class SceneDescription:
     ----------
     renderer : str
         Name and version of the renderer.
-    variant : str
-        Backend of its kernels.
     shapes : tuple of str
         Names of shapes 1, 2, ...
     has_background : bool
@@ -260,7 +258,6 @@ class SceneDescription:
     """
 
     renderer: str
-    variant: str
     shapes: tuple[str, ...]
     has_background: bool = True
     notes: tuple[str, ...] = ()

@@ -412,7 +412,7 @@ class OutputSettings(Section):
 
 @dataclass(frozen=True)
 class LimitSettings(Section):
-    """Limits of resources; no result depends on them."""
+    """Limits of resources. Rare long paths depend on the number of paths in flight, nothing else."""
 
     table = "limits"
 

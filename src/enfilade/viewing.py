@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from enfilade.errors import InputError
 
+MAX_PIXELS_PER_DEGREE = 1000.0  # ten times what the eye resolves: distances in centimetres are refused
 Quantity = TypeVar("Quantity", float, npt.NDArray[np.float32], npt.NDArray[np.float64])
 
 
@@ -73,6 +74,13 @@ class Viewing:
             msg = (
                 f"viewing: black_cd_m2 is {self.black_cd_m2!r}; "
                 f"give 0 or more, and less than peak_cd_m2 ({self.peak_cd_m2!r})"
+            )
+            raise InputError(msg)
+        if self.pixels_per_degree > MAX_PIXELS_PER_DEGREE:
+            msg = (
+                f"viewing: distance_m = {self.distance_m:g} and diagonal_m = {self.diagonal_m:g} show "
+                f"{self.pixels_per_degree:.0f} pixels in a degree, more than {MAX_PIXELS_PER_DEGREE:.0f}; "
+                "both are in metres"
             )
             raise InputError(msg)
 

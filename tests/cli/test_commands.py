@@ -7,6 +7,7 @@ import pytest
 from enfilade.cli import farm, work
 from enfilade.images import read_exr
 from enfilade.runs.folder import RunFolder
+from support.toys import flip
 
 
 def test_render_continue_and_report(run, line, tmp_path):
@@ -57,6 +58,22 @@ def test_prepare_shards_and_farm(run, line, tmp_path):
     assert "openjd_progress: 100.0" in progress.stdout
     assert run("work", folder, "--quiet").exit_code == 0
     assert (folder / "video.mp4").exists()
+
+
+def test_damaged_files_are_made_again_by_work(run, line, tmp_path):
+    """As the message of a command that finds them says."""
+    folder = tmp_path / "my run"
+    assert run(*[folder if word == tmp_path / "run" else word for word in line]).exit_code == 0
+    whole = RunFolder.read(folder).digest()
+    flip(folder / "frames" / "0001.exr")
+    damaged = run("report", folder)
+    assert f"0001.exr is missing or damaged; `enfilade work '{folder}' --verify` makes it again" in (
+        " ".join(damaged.output.split())
+    )
+    assert run("work", folder, "--verify", "--quiet").exit_code == 0
+    assert RunFolder.read(folder).digest() == whole
+    assert RunFolder.read(folder).damaged() == []
+    assert "leave out --pass" in run("work", folder, "--verify", "--pass", "frames").stderr
 
 
 def test_plan(run, line, tmp_path):

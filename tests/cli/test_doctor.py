@@ -43,6 +43,16 @@ def test_a_missing_package_is_named_with_its_remedy(run, monkeypatch):
     assert (extra.is_required, extra.remedy) == (False, "pip install 'opencolorio>=2.4'")
 
 
+def test_a_package_that_is_too_old_is_named_with_its_remedy(run, monkeypatch):
+    version = importlib.metadata.version
+    monkeypatch.setattr(
+        installation.importlib.metadata, "version", lambda n: "3.5.0" if n == "mitsuba" else version(n)
+    )
+    result = run("doctor")
+    assert result.exit_code == 1
+    assert "mitsuba>=3.9" in {check.name: check for check in examine()}["mitsuba"].remedy.replace("<4,", "")
+
+
 def test_a_missing_system_library_is_named(run, monkeypatch):
     monkeypatch.setitem(sys.modules, "drjit", None)
     result = run("doctor")

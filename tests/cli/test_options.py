@@ -57,6 +57,13 @@ def test_assignments(settings):
     assert settings("--quality", "5")[DecoupledSettings].quality == 5.0
 
 
+def test_numbers_of_thousands_of_digits_are_refused(run, camera_path):
+    line = ("render", "s.xml", "--path", camera_path, "--out", camera_path.parent / "run")
+    result = run(*line, "--set", f"trace.seed={'1' * 5000}")
+    assert result.exit_code == 2
+    assert "seed" in result.stderr
+
+
 def test_paths_are_absolute(settings, tmp_path, monkeypatch):
     here, there = tmp_path / "here", tmp_path / "there"
     here.mkdir()

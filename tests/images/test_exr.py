@@ -48,7 +48,7 @@ def test_every_layer_comes_back_bit_by_bit(tmp_path, layers):
 
 def test_channels_have_the_names_that_other_programs_expect(tmp_path):
     one, two, three = (np.zeros((4, 5, *s), np.float32) for s in ((), (2,), (3,)))
-    layers = {"": three, "Z": one, "P": three, "N": three, "albedo": three, "forward": two}
+    layers = {"RGB": three, "Z": one, "P": three, "N": three, "albedo": three, "forward": two}
     write_exr(tmp_path / "a.exr", {**layers, "item": one.astype(np.uint32)}, is_portable=True)
     with OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True) as image:
         names = sorted(image.channels())

@@ -13,6 +13,7 @@ from PIL import Image
 import enfilade
 from enfilade.comparison import CompareOptions, compare
 from enfilade.errors import DamagedFileError, ImageError, RunFolderError, SettingsError
+from enfilade.files import write_json
 from enfilade.images import read_exr
 from enfilade.images.view import open_view
 from enfilade.kernels.tone import srgb_encode
@@ -163,6 +164,20 @@ def test_without_a_reference_its_layers_are_missing(copied, tmp_path):
     assert notes == []
     assert enfilade.report(copied) == copied / "report.html"
     assert data_of((copied / "report.html").read_text()) == data
+
+
+def test_a_run_without_its_video_is_not_finished(tmp_path):
+    """Also with that of another codec, while the new one is encoded."""
+    folder = synthetic_run(tmp_path / "run")
+    job = json.loads((folder / "job.json").read_text())
+    job["settings"]["video"]["codec"] = "ffv1"
+    write_json(folder / "job.json", job)
+    assert "state-unfinished" in written(folder, tmp_path)[1]
+    job["settings"]["video"]["codec"] = "h264"
+    write_json(folder / "job.json", job)
+    assert "state-finished" in written(folder, tmp_path)[1]
+    (folder / "video.mp4").unlink()
+    assert "state-unfinished" in written(folder, tmp_path)[1]
 
 
 def test_a_running_run_is_shown_as_far_as_it_is_finished(tmp_path):

@@ -130,11 +130,14 @@ def test_a_task_takes_its_share_of_ray(joined, listening, monkeypatch):
     ray, cluster = joined(NODE, BIG, count=4, threads=1)
     assert (cluster.slots, ray.begun["address"]) == (4, f"127.0.0.1:{listening.getsockname()[1]}")
     assert ray.options == {"num_cpus": 1, "num_gpus": 0.0, "max_retries": 0, "max_calls": 0}
+    monkeypatch.setattr("enfilade.runs.cluster.cores", lambda: 2)
     ray, _ = joined(BIG, count=3, threads=2, address="")
     assert (ray.begun["address"], ray.begun["num_cpus"]) == ("local", 6)
-    monkeypatch.setattr("enfilade.runs.cluster.cores", lambda: 2)
     ray, _ = joined(BIG, threads=4, address="")
     assert ray.begun["num_cpus"] == 4
+    monkeypatch.setattr("enfilade.runs.cluster.cores", lambda: 8)
+    ray, cluster = joined({"CPU": 8.0}, count=2, address="")  # all cores are used
+    assert (ray.begun["num_cpus"], ray.options["num_cpus"], cluster.slots) == (8, 4, 2)
     ray, _ = joined(BIG, address="auto")
     assert ray.begun["address"] == "auto"
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from enfilade.images import open_sequence, read_exr
+from enfilade.errors import ImageError
+from enfilade.images import open_sequence, read_exr, write_exr
 from enfilade.monitor import Silence
 from enfilade.runs import delivery
 from enfilade.runs.delivery import analysis_tasks, clip_spans, video_tasks
@@ -56,3 +57,18 @@ def test_a_lost_part_of_the_video_is_encoded_again(tmp_path, monkeypatch, name):
     render(job, tmp_path / "run", Silence())
     assert (tmp_path / "run" / name).exists()
     assert RunFolder.read(tmp_path / "run").digest() == before
+
+
+def test_a_nan_is_reported_with_its_file(tmp_path):
+    """Not by its place in a clip."""
+    job = toy_job(tmp_path, 2)
+    render(job, tmp_path / "run", Silence())
+    stem = tmp_path / "run" / "frames" / "0002"
+    image = read_exr(stem.with_suffix(".exr"))
+    image["RGB"][0, 0] = np.nan
+    write_exr(stem.with_suffix(".exr"), image)
+    with RunFolder.create(tmp_path / "run", job.identity()) as run:
+        record = run.record_of([stem.with_suffix(".exr")])
+        run.finish({"pass": "frames", "frame": 2, "files": record, "cost": {}})
+        with pytest.raises(ImageError, match=r"frames/0002\.exr holds a NaN"):
+            list(delivery.images_of(run, (1, 2)))

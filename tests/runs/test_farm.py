@@ -12,7 +12,9 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from click.testing import CliRunner
 
+from enfilade.cli import main
 from enfilade.errors import EnfiladeError, SettingsError
 from enfilade.files import write_json
 from enfilade.runs import farm
@@ -146,6 +148,24 @@ def test_slurm_gets_each_step_as_an_array_that_waits_for_the_one_before(begun, s
     submit(begun, "slurm", 1, {"slurm_exclusive": "user"}, print)
     cpus = {number: asked(lines, "cpus-per-task") for number, lines in slurm().items()}
     assert (cpus[106], cpus[112]) == ("3", None)
+
+
+def test_parameters_of_submitit_may_be_lists_and_tables(begun, slurm):
+    def run(*words):
+        return CliRunner().invoke(main, [str(word) for word in words], prog_name="enfilade")
+
+    line = ("farm", begun, "--submit", "slurm", "--shards", "1", "--slurm", 'slurm_setup=["module load x"]')
+    line += ("--slurm", "slurm_use_srun=false", "--slurm", "slurm_account=007")
+    line += ("--slurm", "slurm_additional_parameters={nice = 100}")
+    assert run(*line).exit_code == 0
+    lines = next(iter(slurm().values()))
+    assert "module load x" in lines
+    assert not any(text.startswith("srun") for text in lines)
+    assert (asked(lines, "account"), asked(lines, "nice")) == ("007", "100")
+    for wrong in ("slurm_setup=module load x", "slurm_additional_parameters=x"):
+        refused = run("farm", begun, "--submit", "slurm", "--slurm", wrong)
+        assert refused.exit_code == 2
+        assert wrong.partition("=")[0].removeprefix("slurm_") in refused.stderr
 
 
 def test_limits_of_slurm(begun, slurm, monkeypatch):

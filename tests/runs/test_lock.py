@@ -11,7 +11,7 @@ import pytest
 from enfilade.errors import NoSpaceError, RunFolderError
 from enfilade.runs.lock import LOCK_FILE, Lock, holder_of
 
-GONE = {"host": socket.gethostname(), "pid": 2**22 + 1, "started": "2026-01-01T00:00:00+00:00", "workers": 2}
+GONE = {"host": socket.gethostname(), "pid": 2**22 + 1, "started": "2026-01-01T00:00:00+00:00", "ticks": 1}
 
 
 def test_a_second_command_is_refused_and_the_first_is_named(tmp_path):
@@ -21,8 +21,8 @@ def test_a_second_command_is_refused_and_the_first_is_named(tmp_path):
             RunFolderError, match=rf"another command is writing .*: process {os.getpid()} on "
         ):
             Lock(tmp_path, is_shared=is_shared)
-    lock.sign(3)
-    assert [holder_of(tmp_path)[key] for key in ("pid", "workers")] == [os.getpid(), 3]
+    lock.sign()
+    assert holder_of(tmp_path)["pid"] == os.getpid()
     lock.release()
     lock.release()
     assert holder_of(tmp_path) is None
@@ -38,7 +38,11 @@ def test_a_killed_holder_is_gone_but_one_on_another_host_may_live(tmp_path):
     (tmp_path / LOCK_FILE).write_text(json.dumps(GONE))
     assert holder_of(tmp_path) is None
     (tmp_path / LOCK_FILE).write_text(json.dumps({**GONE, "host": "another"}))
-    assert holder_of(tmp_path) == {**GONE, "host": "another"}
+    assert holder_of(tmp_path) == {
+        name: {**GONE, "host": "another"}[name] for name in ("host", "pid", "started")
+    }
+    (tmp_path / LOCK_FILE).write_text(json.dumps({**GONE, "pid": os.getpid()}))  # its number was given again
+    assert holder_of(tmp_path) is None
     for text in ("", "[]", '{"pid": "x"}', "{"):
         (tmp_path / LOCK_FILE).write_text(text)
         assert holder_of(tmp_path) is None

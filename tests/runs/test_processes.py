@@ -76,6 +76,14 @@ def test_workers_that_hang_or_are_stopped_are_killed(tmp_path, opened):
         assert "killed: it took more than 0.2 s ([limits] task_timeout_s)" in end.result.text
 
 
+def test_a_worker_that_is_killed_while_it_loads_the_scene_had_both_limits(tmp_path, opened):
+    order(tmp_path, light_1="hang")
+    with opened(task_timeout_s=1e-3, preflight_s=0.1) as executor:  # no process begins so fast
+        executor.begin(0, Order(LIGHT[0]))
+        (ended,) = executor.wait(None)
+    assert "took more than 0.101 s ([limits] task_timeout_s and preflight_s)" in ended.result.text
+
+
 def test_the_time_limit_does_not_include_loading(opened):
     with opened(task_timeout_s=3600.0) as executor:
         executor.begin(0, Order(LIGHT[0]))

@@ -124,6 +124,16 @@ def test_after_a_lack_of_memory_fewer_paths_are_in_flight(tmp_path, rendered, wh
     assert paths == [1 << 20, 1 << 18, 1 << 16]
     assert "light 2: MemoryError: out of it; it is tried again, with fewer paths in flight" in monitor.said
     assert (tmp_path / "attempts" / "frames-4").read_text().split()[1] == str(1 << 16)  # and it stays so
+    lines = {(line["pass"], line["frame"]): line for line in RunFolder.read(tmp_path / "run").lines()}
+    assert lines["light", 2]["reduction"] == lines["frames", 4]["reduction"] == 16
+    assert "reduction" not in lines["analysis", 1]
+
+
+def test_fewer_paths_are_in_flight_after_a_damaged_file_too(tmp_path, rendered):
+    order(tmp_path, light_1="memory")
+    rendered(limits={"paths_in_flight": 1 << 20}, monitor=damaged_after(tmp_path, "light/0002.exr", 1 + 4))
+    last = (tmp_path / "attempts" / "light-2").read_text().splitlines()[-1]
+    assert last.split()[1] == str(1 << 18)
 
 
 def damaged_after(tmp_path, name, tasks):

@@ -56,7 +56,6 @@ class AnalyticRenderer:
         """Facts of the scene."""
         return SceneDescription(
             renderer="analytic",
-            variant=dr.backend_v(Float).name.lower(),
             shapes=tuple(shape.name for shape in self._scene.shapes),
         )
 

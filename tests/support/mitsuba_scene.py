@@ -45,4 +45,4 @@ def opened(file, **settings):
 
 def write_holes(folder):
     """A texture whose left half is 1 and whose right half is 0."""
-    write_exr(folder / "holes.exr", {"": np.array([[[1.0] * 3, [0.0] * 3]], np.float32)}, is_portable=True)
+    write_exr(folder / "holes.exr", {"RGB": np.array([[[1.0] * 3, [0.0] * 3]], np.float32)}, is_portable=True)

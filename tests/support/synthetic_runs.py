@@ -160,7 +160,8 @@ def synthetic_run(
             _finish(run, "frames", number, {"provenance": counts}, [file])
         if finished is None and has_video:
             (folder / "video.mp4").write_bytes(b"a video")
-            _finish(run, "video", FRAMES[0], {}, [folder / "video.mp4"])
+            encoded = {"video": {"codec": "h264", "exposure_ev": 0.0}}
+            _finish(run, "video", FRAMES[0], encoded, [folder / "video.mp4"])
     return folder
 
 

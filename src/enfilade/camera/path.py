@@ -79,6 +79,10 @@ class CameraPath:
                 raise CameraPathError(f"frame {after} follows frame {before}; the numbers must rise")
         if wrong := [cut for cut in self.cuts if cut not in range(len(self))]:
             raise CameraPathError(f"cuts at {wrong}; they are indices from 0 to {len(self) - 1}")
+        plain = {"numbers": tuple(map(int, self.numbers)), "fps": float(self.fps),
+                 "cuts": frozenset(map(int, self.cuts))}  # fmt: skip
+        for name, value in plain.items():  # of NumPy's types, too: JSON has others
+            object.__setattr__(self, name, value)
 
     def __len__(self) -> int:
         return len(self.cameras)

@@ -58,7 +58,15 @@ class Camera:
             raise CameraPathError(f"an image of {self.width}x{self.height} pixels can't be rendered")
         if not np.isfinite(self.principal_point).all():
             raise CameraPathError(f"the principal point is {self.principal_point}; it must be finite")
-        object.__setattr__(self, "world_from_camera", matrix)
+        plain = {
+            "world_from_camera": matrix,
+            "fov_deg": float(self.fov_deg),
+            "width": int(self.width),
+            "height": int(self.height),
+            "principal_point": tuple(map(float, self.principal_point)),
+        }
+        for name, value in plain.items():  # of NumPy's types, too: JSON has others
+            object.__setattr__(self, name, value)
 
     @cached_property
     def focal_px(self) -> float:

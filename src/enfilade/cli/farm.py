@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from enfilade.cli.group import debug_option
+from enfilade.cli.options import value_of
 from enfilade.errors import SettingsError
 
 
@@ -61,4 +62,5 @@ def _pair(text: str) -> tuple[str, Any]:
     key, _, value = text.partition("=")
     if not key or not value:
         raise click.BadParameter(f"{text!r} is not KEY=VALUE", param_hint="--slurm")
-    return key, int(value) if value.isdecimal() else value
+    found = value_of(value)
+    return key, found if isinstance(found, (bool, int, float, list, dict)) else value

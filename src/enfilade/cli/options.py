@@ -243,16 +243,20 @@ def tables_of(ctx: click.Context, kinds: Iterable[type[Section]]) -> dict[str, d
 
 
 def _assignment(text: str) -> tuple[str, str, Any]:
-    import tomllib
-
     match = re.fullmatch(r"\s*(\w+)\.(\w+)\s*=(.*)", text)
     if match is None:
         raise SettingsError(f"--set {text}: write it like --set masks.slow_deg_s=0.3")
+    return match[1], match[2], value_of(match[3])
+
+
+def value_of(text: str) -> Any:
+    """A value as TOML has it, or a word without quotes."""
+    import tomllib
+
     try:
-        value = tomllib.loads(f"value = {match[3]}")["value"]
-    except tomllib.TOMLDecodeError:
-        value = match[3].strip()  # a word without quotes
-    return match[1], match[2], value
+        return tomllib.loads(f"value = {text}")["value"]
+    except (ValueError, RecursionError):  # also of numbers of thousands of digits
+        return text.strip()
 
 
 def _make_absolute(tables: dict[str, Any], folder: Path, kinds: Iterable[type[Section]]) -> None:

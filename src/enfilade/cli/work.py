@@ -26,6 +26,12 @@ from enfilade.errors import RunFolderError, SettingsError
     metavar="I/N",
     help="Shard of the pass: the first of four is 1/4.",
 )
+@click.option(
+    "--verify",
+    "is_verified",
+    is_flag=True,
+    help="Compare all finished files with their checksums first; make damaged ones again.",
+)
 @click.option("--openjd", "is_openjd", is_flag=True, help="Print progress for Open Job Description.")
 @worker_options
 @device_option
@@ -39,6 +45,7 @@ def command(
     run: Path,
     pass_name: str | None,
     shard: str,
+    is_verified: bool,
     is_openjd: bool,
     device: Choice,
     quiet: bool,
@@ -49,11 +56,13 @@ def command(
     With --pass, several commands may work on one run, on one or many hosts: each pass after the one before,
     all shards of a pass at the same time.
     """
-    match = re.fullmatch(r"([0-9]+)/([0-9]+)", shard)
+    match = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", shard)
     if match is None:
         raise SettingsError(f"--shard {shard}: write it like 1/4")
     if pass_name is None and shard != "1/1":
         raise SettingsError("--shard needs --pass")
+    if pass_name is not None and is_verified:
+        raise SettingsError("--verify is of a whole run: leave out --pass")
     mark_resumable(ctx)
     activate(_device_of(run) if device == "auto" else device)
     from enfilade.cli.progress import OpenJdMonitor, watch
@@ -66,7 +75,7 @@ def command(
     with watch(quiet=quiet or is_openjd) as silent:
         monitor = OpenJdMonitor(click.echo) if is_openjd else silent
         if pass_name is None:
-            summary = render(read_job(run), run, monitor, workers)
+            summary = render(read_job(run), run, monitor, workers, is_verified=is_verified)
         else:
             render_shard(run, Shard(pass_name, int(match[1]), int(match[2])), monitor, workers)
     if pass_name is None:

@@ -151,10 +151,7 @@ def _checked(frames: Iterable[F32], shape: tuple[int, int, int]) -> Iterator[F32
         if linear.shape != shape:
             raise ImageError(f"frame {index} of the video has shape {linear.shape}, not {shape}")
         if np.isnan(linear).any():
-            raise ImageError(
-                f"frame {index} of the video holds a NaN; it can't be encoded. Correct the scene: normals of "
-                "length 0 and NaN in textures make such pixels"
-            )
+            raise ImageError(f"frame {index} of the video holds a NaN; it can't be encoded")
         yield linear
     if index < 0:
         raise ImageError("a video of no frames can't be encoded")

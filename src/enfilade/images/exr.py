@@ -143,7 +143,7 @@ def _channels(layers: Mapping[str, Array]) -> dict[str, Array]:
 
 
 def _channel_names(name: str, array: Array) -> list[str]:
-    is_main = name in ("", "RGB")
+    is_main = name == "RGB"
     if array.ndim == 2:
         return [name]
     if array.ndim != 3 or array.shape[2] not in ((3,) if is_main else (2, 3)):

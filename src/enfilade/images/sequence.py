@@ -31,7 +31,7 @@ def open_sequence(source: Path | str, *, layer: str | None = None) -> Sequence:
     ----------
     source
         A folder of images of one kind (OpenEXR, PNG, JPEG, TIFF, TGA, WebP, BMP), in natural order of their
-        names, which may differ in one number; a run folder, of which the finished frames are read; one image;
+        names, which may differ in one number; a run folder, whose frames are read; one image;
         a pattern (``f.%04d.exr``, ``f.####.png``, ``f*.jpg``); or a video.
     layer
         Of OpenEXR files, the layer or part to read; ignored for others.

@@ -73,7 +73,7 @@ def contents(run: ReportedRun, film: Film, reference: Mapping[str, Any] | None) 
 
 def _state(run: ReportedRun) -> dict[str, str]:
     count = f"{len(run.there)} of {len(run.numbers)} frames"
-    if run.is_finished:
+    if run.is_finished and run.holder is None:
         return {"word": "finished", "text": f"all {len(run.numbers)} frames and the video"}
     last = f"last result {run.last_result:%Y-%m-%d %H:%M} UTC"
     if run.holder is None:

@@ -13,6 +13,7 @@ from enfilade.errors import ImageError, RunFolderError, SceneError
 from enfilade.images import read_exr
 from enfilade.methods.base import FRAMES
 from enfilade.records import F32, U8, Flow
+from enfilade.runs.delivery import VIDEO
 from enfilade.runs.folder import RunFolder
 from enfilade.runs.identity import RUN_FILE
 from enfilade.runs.job import JOB_FILE, read_table
@@ -106,8 +107,11 @@ class ReportedRun:
 
     @property
     def is_finished(self) -> bool:
-        """Whether all frames and the video are finished."""
-        return bool(self.summary["video"]) and len(self.there) == len(self.numbers)
+        """Whether all frames and the video, as it is set, are finished."""
+        line = self._run.line(VIDEO.name, self.numbers[0])
+        wanted = {"exposure_ev": self.viewing_settings.exposure_ev, "codec": self.video.codec}
+        is_encoded = line is not None and wanted.items() <= line["video"].items()
+        return is_encoded and len(self.there) == len(self.numbers)
 
     def frame(self, index: int) -> DeliveredFrame:
         """Read a frame; its checksum is compared.

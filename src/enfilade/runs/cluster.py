@@ -54,7 +54,7 @@ class Cluster:
         self._in_hand: dict[Any, int] = {}
         threads = max(workers.threads, 1)
         try:
-            self._connect(address, cpus=(workers.count or max(cores() // threads, 1)) * threads)
+            self._connect(address, cpus=max(cores(), (workers.count or 1) * threads))
             nodes = [node["Resources"] for node in ray.nodes() if node["Alive"]]
         except (ConnectionError, RuntimeError, ValueError, TimeoutError) as error:
             start = "start one there with `ray start --head`, or correct --executor ray:HOST:PORT"

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from enfilade.arrays import to_half
+from enfilade.errors import ImageError
 from enfilade.gbuffer import View, positions
 from enfilade.images import encode_video, exact_fps, join_videos, read_exr, video_suffix, write_exr
 from enfilade.methods.base import FRAMES, Pass, Task, TaskId
@@ -111,6 +112,20 @@ def _clip(run: RunFolder, job: Job, first: int) -> Path:
 
 
 def images_of(run: RunFolder, numbers: Iterable[int]) -> Iterator[F32]:
-    """Colours of finished frames, (H, W, 3) linear; the files are checked as they are read."""
+    """Colours of finished frames, (H, W, 3) linear; the files are checked as they are read.
+
+    Raises
+    ------
+    DamagedFileError
+    ImageError
+        A frame holds a NaN.
+    """
     for number in numbers:
-        yield read_exr(run.file_of(FRAMES, number))["RGB"].astype(np.float32)
+        file = run.file_of(FRAMES, number)
+        color = read_exr(file)["RGB"].astype(np.float32)
+        if np.isnan(color).any():
+            raise ImageError(
+                f"{file} holds a NaN and can't be encoded. Correct the scene: normals of length 0 and NaN in "
+                "textures make such pixels"
+            )
+        yield color

@@ -25,7 +25,7 @@ MIN_PATHS_IN_FLIGHT = 1024
 
 @dataclass(frozen=True)
 class Workers:
-    """The workers that do the tasks of a run. They change no result.
+    """The workers that do the tasks of a run. No result depends on their number.
 
     Attributes
     ----------
@@ -76,8 +76,7 @@ class Workers:
         """
         if self.executor == EXECUTORS[0] and limits.task_timeout_s:
             raise SettingsError(
-                "[limits] task_timeout_s has no effect on tasks in this process; add --executor processes, "
-                "or leave it out"
+                "[limits] task_timeout_s has no effect on tasks in this process; add --executor processes"
             )
         if self.executor.startswith("ray") and find_spec("ray") is None:
             raise EnfiladeError("--executor ray needs Ray: install it with: pip install ray")

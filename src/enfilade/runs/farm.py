@@ -217,7 +217,10 @@ def _executor(submitit: Any, folder: Path, cluster: str, options: dict[str, Any]
         cores = given.get("slurm_cpus_per_task", given.get("cpus_per_task"))
         if cores is not None:  # srun doesn't ask sbatch how many
             given.setdefault("slurm_srun_args", [f"--cpus-per-task={cores}"])
-        more = {"requeue": True, **given.get("slurm_additional_parameters", {})}
+        more = given.get("slurm_additional_parameters", {})
+        if not isinstance(more, dict):
+            raise SettingsError(f"--slurm slurm_additional_parameters={more}: write it like {{nice = 100}}")
+        more = {"requeue": True, **more}
         if previous:
             more |= {"dependency": "afterok:" + ":".join(previous), "kill-on-invalid-dep": "yes"}
         given["slurm_additional_parameters"] = more
@@ -226,8 +229,13 @@ def _executor(submitit: Any, folder: Path, cluster: str, options: dict[str, Any]
             folder=folder / "slurm", cluster=cluster, slurm_max_num_timeout=timeouts
         )
         executor.update_parameters(**given)
-    except (NameError, ValueError, AssertionError) as error:  # a parameter unknown, or of a wrong type
-        raise SettingsError(f"submitit takes no such --slurm: {error}") from error
+    except (
+        NameError,
+        TypeError,
+        ValueError,
+        AssertionError,
+    ) as error:  # a parameter unknown, or of a wrong type
+        raise SettingsError(f"submitit refuses --slurm {' '.join(options)}: {error}") from error
     except RuntimeError as error:
         raise EnfiladeError(f"submitit: {error}") from error
     return executor

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shlex
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -215,7 +216,9 @@ class RunFolder:
         if _is_intact(file, line["files"][name]):
             return file
         raise DamagedFileError(
-            f"{file} is missing or damaged; run the same command again to make it again", name
+            f"{file} is missing or damaged; `enfilade work {shlex.quote(str(self.folder))} --verify` "
+            "makes it again",
+            name,
         )
 
     def file_of(self, pass_name: str, number: int) -> Path:

@@ -60,7 +60,7 @@ def identity_of(folder: Path) -> dict[str, Any]:
         raise RunFolderError(f"{folder} is no run folder: it has no {RUN_FILE}")
     value = read_json(file)
     if not isinstance(value, dict) or not isinstance(value.get("identity"), dict):
-        raise RunFolderError(f"{file} is damaged; run the command that made it again, or delete {folder}")
+        raise RunFolderError(f"{file} is damaged; run the command that made it again")
     if value.get("format") != FORMAT:
         raise RunFolderError(
             f"{file} has format {value.get('format')!r}, this version reads format {FORMAT}; choose another "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import shlex
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -221,7 +222,8 @@ def read_job(folder: Path) -> Job:
     """
     file = folder / JOB_FILE
     if not file.is_file():
-        raise RunFolderError(f"{folder} holds no run; begin one with `enfilade render SCENE --out {folder}`")
+        out = shlex.quote(str(folder))
+        raise RunFolderError(f"{folder} holds no run; begin one with `enfilade render SCENE --out {out}`")
     table = read_table(folder)
     try:
         return Job.from_json(table)

@@ -24,7 +24,7 @@ Key = tuple[str, int]  # pass and number of the frame
 
 SUM = "sum"  # last key of a line
 SUM_DIGITS = 16  # of SHA-256
-NOT_IN_DIGEST = ("cost",)  # times differ from run to run
+NOT_IN_DIGEST = ("cost", "reduction")  # times differ from run to run, and so may the memory
 APPENDING = os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC | os.O_NOFOLLOW
 
 
@@ -154,7 +154,7 @@ class Ledger:
 
 
 def digest_line(line: Mapping[str, Any]) -> str:
-    """The part of a line that is the same whenever the same work is done: all but times."""
+    """The part of a line that is the same whenever the same work is done: all but times and `reduction`."""
     kept = {key: value for key, value in line.items() if key not in NOT_IN_DIGEST}
     return json.dumps(kept, sort_keys=True, ensure_ascii=False)
 

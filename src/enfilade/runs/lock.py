@@ -55,15 +55,15 @@ class Lock:
                 "choose another --out"
             ) from error
         if not is_shared:
-            self.sign(1)
+            self.sign()
 
-    def sign(self, workers: int) -> None:
-        """Write this process and its number of workers into the file, for reports and messages."""
+    def sign(self) -> None:
+        """Write this process into the file, for reports and messages."""
         name = {
             "host": socket.gethostname(),
             "pid": os.getpid(),
             "started": datetime.now(UTC).isoformat(timespec="seconds"),
-            "workers": workers,
+            "ticks": _ticks_of(os.getpid()),
         }
         data, size = json.dumps(name).encode() + b"\n", 0
         with contextlib.suppress(OSError):  # a full disk: nothing depends on it
@@ -96,21 +96,26 @@ def holder_of(folder: Path) -> dict[str, Any] | None:
     Returns
     -------
     dict or None
-        ``host``, ``pid``, ``started`` (ISO 8601) and ``workers``; None where the process is gone, which can't
-        be seen of another host.
+        ``host``, ``pid`` and ``started`` (ISO 8601); None where the process is gone, which can't be seen of
+        another host.
     """
     try:
         name = json.loads((folder / LOCK_FILE).read_bytes())
-        holder = {
-            "host": str(name["host"]),
-            "pid": int(name["pid"]),
-            "started": str(name["started"]),
-            "workers": int(name["workers"]),
-        }
+        pid, ticks = int(name["pid"]), int(name["ticks"])
+        holder = {"host": str(name["host"]), "pid": pid, "started": str(name["started"])}
     except (OSError, ValueError, KeyError, TypeError, OverflowError):  # empty, or being written
         return None
-    is_gone = holder["host"] == socket.gethostname() and not Path(f"/proc/{holder['pid']}").exists()
+    # In a container another process may have its number again.
+    is_gone = holder["host"] == socket.gethostname() and ticks != _ticks_of(pid)
     return None if is_gone else holder
+
+
+def _ticks_of(pid: int) -> int | None:
+    """When a process of this host began, in clock ticks since the system did; None where it is gone."""
+    try:
+        return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[19])
+    except OSError:
+        return None
 
 
 def _named(holder: dict[str, Any] | None) -> str:

@@ -39,6 +39,7 @@ class _Child:
     pipe: Connection
     log: Path
     is_busy: bool = False
+    has_begun: bool = False  # its task: the scene is loaded
     until_s: float | None = None  # when it is killed
     oom_kills: int = 0
 
@@ -94,7 +95,7 @@ class Processes:
             self._end(slot)
             child = None
         child = child or self._started(slot)
-        child.is_busy, child.oom_kills = True, oom_kills()
+        child.is_busy, child.has_begun, child.oom_kills = True, False, oom_kills()
         child.until_s = self._deadline(self._limits.preflight_s)
         with contextlib.suppress(OSError):  # it died: `wait` finds out
             child.pipe.send_bytes(pickle.dumps(order))
@@ -161,8 +162,8 @@ class Processes:
             result = child.pipe.recv()
         except (EOFError, OSError):
             return self._died(slot)
-        if result is None:  # the scene is loaded
-            child.until_s = self._deadline()
+        if result is None:
+            child.has_begun, child.until_s = True, self._deadline()
             return None
         child.is_busy, child.until_s = False, None
         return Ended(slot, result)
@@ -178,8 +179,10 @@ class Processes:
         child = self._children[slot]
         child.process.kill()
         self._end(slot)
-        limit_s = self._limits.task_timeout_s
-        text = f"its worker was killed: it took more than {limit_s:g} s ([limits] task_timeout_s)"
+        limit_s, settings = self._limits.task_timeout_s, "task_timeout_s"
+        if not child.has_begun:
+            limit_s, settings = limit_s + self._limits.preflight_s, "task_timeout_s and preflight_s"
+        text = f"its worker was killed: it took more than {limit_s:g} s ([limits] {settings})"
         return Ended(slot, Failure(FailureKind.ERROR, text, _tail(child.log)))
 
     def _deadline(self, more_s: float = 0.0) -> float | None:

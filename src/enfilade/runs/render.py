@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -177,8 +178,8 @@ def _place(task: Task) -> int:
 
 def _too_early(run: RunFolder, pass_name: str, which: str = "") -> UnfinishedError:
     return UnfinishedError(
-        f"{run.folder}: pass {pass_name!r} is not finished{which}; first run `enfilade work {run.folder} "
-        f"--pass {pass_name}`"
+        f"{run.folder}: pass {pass_name!r} is not finished{which}; first run `enfilade work "
+        f"{shlex.quote(str(run.folder))} --pass {pass_name}`"
     )
 
 

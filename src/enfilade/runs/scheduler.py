@@ -98,6 +98,7 @@ def work(
         again.
     """
     damages: Counter[str] = Counter()
+    reduction = 1
     finished: Counter[TaskId] = Counter()
     executor: Executor | None = None
     run.refresh()
@@ -110,7 +111,8 @@ def work(
                 return
             _check_progress(job, [task for task in left if finished[task.id] >= ATTEMPTS])
             executor = executor or open_executor(job, run, workers)
-            damaged = _Loop(job, run, left, executor, monitor, mine).run()
+            loop = _Loop(job, run, left, executor, monitor, mine, reduction)
+            damaged, reduction = loop.run(), loop.reduction
             if damaged is None:
                 finished.update(task.id for task in left)
                 if left[0].pass_name == ANALYSIS.name:
@@ -181,7 +183,7 @@ def open_executor(job: Job, run: RunFolder, workers: Workers) -> Executor:
 
         executor = Cluster(run, limits, workers, address=address, device=device)
     if run.lock is not None:
-        run.lock.sign(executor.slots)
+        run.lock.sign()
     return executor
 
 
@@ -196,6 +198,7 @@ class _Loop:
         executor: Executor,
         monitor: Monitor,
         everything: Iterable[Task],
+        reduction: int,
     ) -> None:
         self._job = job
         self._run = run
@@ -206,7 +209,7 @@ class _Loop:
         self._counts = self._totals - Counter(task.pass_name for task in left)
         self._in_hand: dict[int, Order] = {}
         self._blocks: dict[int, int] = {}  # of the workers
-        self._reduction = 1  # of the paths in flight
+        self.reduction = reduction  # of the paths in flight, after a lack of memory
         self._failures: dict[TaskId, list[Failure]] = {}
         self._delayed: list[tuple[float, TaskId, Task]] = []
         self._set_aside: list[Task] = []
@@ -225,7 +228,7 @@ class _Loop:
             for ended in sorted(results, key=lambda ended: isinstance(ended.result, Failure)):
                 order = self._in_hand.pop(ended.slot)
                 if not isinstance(ended.result, Failure):
-                    self._finish(order.task, ended.result)
+                    self._finish(order, ended.result)
                 elif isinstance(ended.result.error, DamagedFileError):
                     damaged = ended.result.error.file
                 else:
@@ -251,12 +254,13 @@ class _Loop:
             task = self._graph.take(self._blocks.get(slot), others)
             if task is None:
                 break
-            self._in_hand[slot], self._blocks[slot] = Order(task, self._reduction), block_of(task)
+            self._in_hand[slot], self._blocks[slot] = Order(task, self.reduction), block_of(task)
             self._executor.begin(slot, self._in_hand[slot])
         return bool(self._in_hand or self._delayed)
 
-    def _finish(self, task: Task, line: dict[str, Any]) -> None:
-        self._run.finish(line)
+    def _finish(self, order: Order, line: dict[str, Any]) -> None:
+        task = order.task
+        self._run.finish(line if order.reduction == 1 else line | {"reduction": order.reduction})
         self._graph.finish(task)
         self._counts[task.pass_name] += 1
         self._monitor.progress(task.pass_name, self._counts[task.pass_name], self._totals[task.pass_name])
@@ -267,7 +271,7 @@ class _Loop:
             raise failure.error or EnfiladeError(failure.text)
         task, fewer = order.task, ""
         if failure.kind is FailureKind.MEMORY:  # other tasks would need as much
-            self._reduction = max(self._reduction, order.reduction * REDUCTION)
+            self.reduction = max(self.reduction, order.reduction * REDUCTION)
             fewer = ", with fewer paths in flight"
         failures = self._failures.setdefault(task.id, [])
         failures.append(failure)

@@ -32,7 +32,7 @@ from enfilade.runs.ledger import plain
 from enfilade.runs.stopwatch import Stopwatch
 
 CACHED_RECORDS = 4
-RESERVED = frozenset({"pass", "frame", "files", "cost", "sum"})  # keys of a ledger line
+RESERVED = frozenset({"pass", "frame", "files", "cost", "reduction", "sum"})  # keys of a ledger line
 
 
 class Worker:

@@ -90,7 +90,6 @@ class MitsubaRenderer:
         self._shapes = Shapes(self._merged)
         self._description = SceneDescription(
             renderer=f"Mitsuba {mi.__version__}",
-            variant=self._device.variant,
             shapes=self._shapes.names,
             has_background=scene.environment() is not None,
             notes=(*ignored(scene, self._integrator), *warnings),
