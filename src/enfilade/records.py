@@ -75,11 +75,11 @@ class Geometry:
 
     def __post_init__(self) -> None:
         size = (self.camera.height, self.camera.width)
-        _check(self.depth, size, np.float32, "depth")
-        _check(self.normal, (*size, 3), np.float32, "normal")
-        _check(self.albedo, (*size, 3), np.float32, "albedo")
-        _check(self.shape_index, size, np.uint32, "shape_index")
-        _check(self.surface, size, np.uint8, "surface")
+        check_array(self.depth, size, np.float32, "depth")
+        check_array(self.normal, (*size, 3), np.float32, "normal")
+        check_array(self.albedo, (*size, 3), np.float32, "albedo")
+        check_array(self.shape_index, size, np.uint32, "shape_index")
+        check_array(self.surface, size, np.uint8, "surface")
 
     @property
     def is_hit(self) -> Mask:
@@ -121,8 +121,8 @@ class Flow:
     has_forward: bool
 
     def __post_init__(self) -> None:
-        _check(self.backward, (*self.forward.shape[:2], 2), np.float32, "backward")
-        _check(self.forward, (*self.backward.shape[:2], 2), np.float32, "forward")
+        check_array(self.backward, (*self.forward.shape[:2], 2), np.float32, "backward")
+        check_array(self.forward, (*self.backward.shape[:2], 2), np.float32, "forward")
 
     @property
     def motion(self) -> F32:
@@ -160,8 +160,8 @@ class Shading:
     dropped: int = 0
 
     def __post_init__(self) -> None:
-        _check(self.color, (*self.variance.shape, 3), np.float32, "color")
-        _check(self.variance, self.color.shape[:-1], np.float32, "variance")
+        check_array(self.color, (*self.variance.shape, 3), np.float32, "color")
+        check_array(self.variance, self.color.shape[:-1], np.float32, "variance")
 
     def to_image(self, where: Mask) -> Shading:
         """Scatter the values of a list of pixels, those of a mask (H, W), into an image; 0 elsewhere."""
@@ -187,8 +187,8 @@ class Halves:
     dropped: int = 0
 
     def __post_init__(self) -> None:
-        _check(self.first, (*self.second.shape[:2], 3), np.float32, "first")
-        _check(self.second, self.first.shape, np.float32, "second")
+        check_array(self.first, (*self.second.shape[:2], 3), np.float32, "first")
+        check_array(self.second, self.first.shape, np.float32, "second")
 
     @property
     def color(self) -> F32:
@@ -236,12 +236,12 @@ class Warped:
 
     def __post_init__(self) -> None:
         size = self.is_disoccluded.shape
-        _check(self.shading.first, (*size, 3), np.float32, "shading.first")
-        _check(self.depth, size, np.float32, "depth")
-        _check(self.shape_index, size, np.uint32, "shape_index")
-        _check(self.magnification, size, np.float32, "magnification")
-        _check(self.footprint, size, np.float32, "footprint")
-        _check(self.is_mixed, size, np.bool_, "is_mixed")
+        check_array(self.shading.first, (*size, 3), np.float32, "shading.first")
+        check_array(self.depth, size, np.float32, "depth")
+        check_array(self.shape_index, size, np.uint32, "shape_index")
+        check_array(self.magnification, size, np.float32, "magnification")
+        check_array(self.footprint, size, np.float32, "footprint")
+        check_array(self.is_mixed, size, np.bool_, "is_mixed")
 
     @property
     def color(self) -> F32:
@@ -265,8 +265,8 @@ class Frame:
     provenance: U8
 
     def __post_init__(self) -> None:
-        _check(self.color, (*self.provenance.shape, 3), np.float32, "color")
-        _check(self.provenance, self.color.shape[:2], np.uint8, "provenance")
+        check_array(self.color, (*self.provenance.shape, 3), np.float32, "color")
+        check_array(self.provenance, self.color.shape[:2], np.uint8, "provenance")
 
     @property
     def counts(self) -> dict[str, int]:
@@ -275,6 +275,7 @@ class Frame:
         return {of.name.lower(): int(counts[of]) for of in Provenance}
 
 
-def _check(array: npt.NDArray[Any], shape: tuple[int, ...], kind: type, name: str) -> None:
+def check_array(array: npt.NDArray[Any], shape: tuple[int, ...], kind: type, name: str) -> None:
+    """Raise ValueError unless an array has a shape and a type."""
     if array.shape != shape or array.dtype != kind:
         raise ValueError(f"{name} is {array.dtype} {array.shape}, expected {np.dtype(kind)} {shape}")

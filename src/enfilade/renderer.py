@@ -70,7 +70,7 @@ class Branch(IntEnum):
 class PixelFilter(IntEnum):
     """Distribution of camera rays over the image plane."""
 
-    CENTRE = 0  # all through the pixel's centre: the paper's ray tracer, antialiased later (§5)
+    CENTRE = 0  # all through the pixel's centre
     BOX = 1  # uniform over the pixel
     GAUSSIAN = 2  # standard deviation 0.5 px, cut at 1.5 px: the support of 3x3 of §5.2
 
@@ -314,12 +314,10 @@ class LobeRenderer(Renderer, Protocol):
     the albedo times ``estimate_diffuse`` plus ``estimate_specular`` converges to the result of ``trace``.
     """
 
-    @property
     def why_inseparable(self) -> str:
         """Reason why the lobes of this scene can't be estimated apart; empty if they can."""
         ...
 
-    @property
     def state(self) -> Any:
         """All arrays that the methods below read, as inputs of a recorded (frozen) kernel."""
         ...
@@ -332,7 +330,6 @@ class LobeRenderer(Renderer, Protocol):
         """The same points at each call: they suggest where bright surfaces are."""
         ...
 
-    @property
     def has_sharp_light(self) -> bool:
         """Whether any emitter casts sharp shadows: a point, spot or directional one, small lamp, or sun."""
         ...
@@ -463,5 +460,5 @@ class LobeRenderer(Renderer, Protocol):
 def why_inseparable(renderer: Renderer) -> str:
     """Reason why a renderer can't estimate the lobes of its scene apart; empty if it can."""
     if isinstance(renderer, LobeRenderer):
-        return renderer.why_inseparable
+        return renderer.why_inseparable()
     return f"the renderer {renderer.describe().renderer!r} does not separate lobes"

@@ -36,7 +36,7 @@ class Guides:
         self._renderer = renderer
         self._branch = branch
         if isinstance(renderer, LobeRenderer):
-            self._extend = recorded(self._extend_kernel, lambda: renderer.state)
+            self._extend = recorded(self._extend_kernel, renderer.state)
 
     def images(
         self, camera: Camera, *, seed: int, frame: int, paths_in_flight: int, is_followed: bool = False

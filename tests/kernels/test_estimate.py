@@ -12,8 +12,8 @@ from enfilade.arrays import Array3f
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry
 from enfilade.kernels.estimate import Estimate, Samples
-from enfilade.kernels.reconstruction import ReconstructedEstimate
 from enfilade.kernels.tone import luminance
+from enfilade.methods.decoupled.reconstruction import ReconstructedEstimate
 from enfilade.records import SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from support.analytic import AnalyticRenderer

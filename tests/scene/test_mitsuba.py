@@ -16,7 +16,7 @@ from enfilade.camera.pinhole import Camera, look_at
 from enfilade.errors import SceneError
 from enfilade.gbuffer import find_geometry
 from enfilade.records import SurfaceClass
-from enfilade.renderer import PixelFilter, Purpose, RandomKey, Rays
+from enfilade.renderer import PixelFilter, Purpose, RandomKey, Rays, why_inseparable
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
 from support.mitsuba_scene import (
     DIFFUSE,
@@ -311,9 +311,10 @@ def test_tables_of_lobes_are_made_for_the_methods_that_read_them(corner_file):
     renderer, camera = opened(corner_file), Camera(look_at((1, 1.5, 3.5), (0, 0.6, 0)), 45.0, 32, 24)
     find_geometry(renderer, camera)
     traced(renderer, camera)
+    assert why_inseparable(renderer) == ""
     made = vars(renderer), vars(renderer._lobes)
     assert not any(name in of for of in made for name in ("_transport", "specular_albedos"))
-    assert renderer.state
+    assert renderer.state()
     assert "_transport" in made[0]
     assert "specular_albedos" in made[1]
 

@@ -41,7 +41,7 @@ def of_integrator(folder, integrator, inside=DIFFUSE):
     ],
 )  # fmt: skip
 def test_why_lobes_are_inseparable(tmp_path, integrator, inside, words):
-    why = opened(of_integrator(tmp_path, integrator, inside)).why_inseparable
+    why = opened(of_integrator(tmp_path, integrator, inside)).why_inseparable()
     assert (words in why) if words else (why == "")
 
 

@@ -40,8 +40,8 @@ def direct(folder, *shapes, integrator="path"):
     renderer = opened(scene)
     rays = Rays(*(Array3f(*of) + dr.zeros(Array3f, COUNT) for of in ((0.0, 0.0, -0.5), (0.0, 0.0, 1.0))))
     point, sampler = renderer.intersect(rays), one_sequence(COUNT)
-    found = renderer.sample_diffuse(point, sampler, soft_only=renderer.has_sharp_light).direct
-    if renderer.has_sharp_light:
+    found = renderer.sample_diffuse(point, sampler, soft_only=renderer.has_sharp_light()).direct
+    if renderer.has_sharp_light():
         found = found + renderer.sharp_light(point, sampler)[0]
     return rows(found).mean(dtype=float)
 

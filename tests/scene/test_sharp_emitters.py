@@ -90,7 +90,7 @@ LAMP_BEHIND = VEILS.replace(
 def test_sharp_and_soft_light_add_up_to_all_direct_light(tmp_path, name, veils, integrator):
     """Behind a cut-out and the shape of a lamp, too."""
     renderer = opened(tmp_path, SKIES[name] + veils, integrator)
-    assert renderer.has_sharp_light == (name in SHARP)
+    assert renderer.has_sharp_light() == (name in SHARP)
 
     def both(rays, sampler):
         point = renderer.intersect(rays)
@@ -103,7 +103,7 @@ def test_sharp_and_soft_light_add_up_to_all_direct_light(tmp_path, name, veils, 
             sample = renderer.sample_specular(ahead, sampler)
             is_alive = is_alive & sample.is_alive & sample.is_passed
             throughput = throughput * sample.throughput
-        sharp = renderer.sharp_light(point, sampler)[0] if renderer.has_sharp_light else Array3f(0)
+        sharp = renderer.sharp_light(point, sampler)[0] if renderer.has_sharp_light() else Array3f(0)
         whole, _ = renderer.estimate_diffuse(point, sampler)
         return Samples((soft + sharp, whole))
 
@@ -126,7 +126,7 @@ def test_the_light_of_a_small_lamp_counts_once(tmp_path, others):
     sky = '<emitter type="constant"><rgb name="radiance" value="0.1"/></emitter>'
     far = "".join(LAMP.format(0.3, 1.5 + 0.1 * i, i - 2) for i in range(others))
     renderer = opened(tmp_path, sky + BULB.format(0.02, "0.33, 0.5, 0.28", "40, 60, 80") + far)
-    assert dr.width(renderer.state[-1][0]) == 1 + others
+    assert dr.width(renderer.state()[-1][0]) == 1 + others
     count = 1 << 16
     origin, beside = np.array([0.6, 0.05, 0.28]), np.array([0.3, 0.48, 0.27])
     rays = Rays(*(Array3f(*map(float, of)) + dr.zeros(Array3f, count) for of in (origin, beside - origin)))
@@ -151,7 +151,7 @@ def test_samples_of_the_sky_beside_a_sun_are_few_times_empty(tmp_path):
 
 def test_of_many_small_lamps_none_casts_sharp_shadows(tmp_path):
     bulbs = "".join(BULB.format(0.02, f"{i / 10 - 1}, 1.5, 0.5", "30, 20, 10") for i in range(5))
-    assert not opened(tmp_path, bulbs).has_sharp_light
+    assert not opened(tmp_path, bulbs).has_sharp_light()
 
 
 def test_all_emitters_of_a_scene_may_be_sharp(tmp_path):
@@ -234,7 +234,7 @@ def test_suns_of_any_size_are_found(tmp_path, aperture_deg, x):
 
 def test_skies_without_a_sun_have_none(tmp_path):
     for sky in ('<emitter type="constant"/>', SKIES["sun and sky"].replace('"0.01"', '"0"'), AREA):
-        assert not opened(tmp_path, sky).has_sharp_light
+        assert not opened(tmp_path, sky).has_sharp_light()
 
 
 def test_a_discrete_distribution_draws_in_proportion():
@@ -250,7 +250,7 @@ def test_a_lamp_may_have_any_texture(tmp_path):
     pattern = '<texture type="checkerboard" name="radiance"/>'
     lamp = placed("rectangle", "lamp", (0, 0, 2), f'<emitter type="area">{pattern}</emitter>', 0.01)
     renderer = opened_file(write(tmp_path, placed("rectangle", "wall", (0, 0, 5), "", 4.0), lamp, sky=""))
-    assert renderer.has_sharp_light
+    assert renderer.has_sharp_light()
     assert not len(renderer.photons().flux)
 
 
@@ -261,4 +261,4 @@ def test_small_lamps_are_found_beside_instances(tmp_path):
     light = f'<emitter type="area">{rgb("radiance", 7, 7, 7)}</emitter>'
     lamp = placed("rectangle", "lamp", (0, 0, 2), light, 0.01)
     wall = placed("rectangle", "wall", (0, 0, 5), "", 4.0)
-    assert opened_file(write(tmp_path, group, instance, lamp, wall, sky="")).has_sharp_light
+    assert opened_file(write(tmp_path, group, instance, lamp, wall, sky="")).has_sharp_light()

@@ -1,4 +1,4 @@
-"""Twin of `enfilade.kernels.reconstruction`: one pixel and one sample at a time, float64."""
+"""Twin of `enfilade.methods.decoupled.reconstruction`: one pixel and one sample at a time, float64."""
 
 import functools
 import math

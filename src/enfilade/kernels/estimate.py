@@ -42,7 +42,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class RayCount:
-    """Number of camera rays, and of those left out since their radiance was not finite."""
+    """Number of rays that begin a path, and of those left out since their radiance was not finite."""
 
     rays: int = 0
     dropped: int = 0

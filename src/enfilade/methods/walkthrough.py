@@ -17,7 +17,7 @@ from enfilade.renderer import PixelFilter, Purpose, RandomKey, Renderer
 from enfilade.settings import Settings, TraceSettings, ViewingSettings
 
 Timed = Callable[[str], AbstractContextManager[Any]]
-CACHED_VIEWS = 4  # computing a view again costs one ray a pixel
+CACHED_VIEWS = 8  # between the shading of a frame and its accumulation, decoupled uses seven
 
 
 class Walkthrough:

@@ -31,7 +31,7 @@ from enfilade.runs.job import Job
 from enfilade.runs.ledger import plain
 from enfilade.runs.stopwatch import Stopwatch
 
-CACHED_RECORDS = 4
+CACHED_RECORDS = 8  # decoupled reads seven shaded frames for each
 RESERVED = frozenset({"pass", "frame", "files", "cost", "reduction", "sum"})  # keys of a ledger line
 
 

@@ -27,7 +27,7 @@ class Preflight:
     Attributes
     ----------
     why_inseparable : str
-        See :attr:`enfilade.renderer.LobeRenderer.why_inseparable`; empty where it is not known.
+        See :meth:`enfilade.renderer.LobeRenderer.why_inseparable`; empty where it is not known.
     notes : list of str
         See :attr:`enfilade.renderer.SceneDescription.notes`.
     """

@@ -73,7 +73,7 @@ def test_highlights_of_sharp_emitters_are_counted_once(tmp_path):
         for at in ("1.8, 3.6, 2.2", "0.2, 3.8, 3")
     )
     renderer, camera = opened_scene(tmp_path, MATERIALS, sky + bulbs), front_camera()
-    assert dr.width(renderer.state[-1][0]) == 3  # sharp emitters beside the sun
+    assert dr.width(renderer.state()[-1][0]) == 3  # sharp emitters beside the sun
     ours = shaded(renderer, IrradianceCache(soft_only=True), camera, 256)
     reference = traced(renderer, camera, 256)
     assert large_errors(renderer, camera, ours, reference) == {}

@@ -26,7 +26,7 @@ def test_the_kernel_finds_the_edges_of_the_loops(tmp_path):
         geometry,
         crease_cosine=kernel.CREASE_COSINE,
         plane_tolerance=PLANE_TOLERANCE,
-        reach=kernel.REACH,
+        reach=kernel.RADIUS_PX,
         min_support=kernel.MIN_SUPPORT,
     )
     for ours, theirs in zip(found, expected, strict=True):

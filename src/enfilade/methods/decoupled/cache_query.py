@@ -10,8 +10,6 @@ import drjit as dr
 from enfilade.arrays import Array3f, Bool
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 
-__all__ = ["CacheQuery", "query_further", "query_hash_grid", "query_view"]
-
 STREAM_SALT = 0x9E3779B9  # makes the jitter of lookups independent of the path's random numbers
 
 

@@ -105,7 +105,7 @@ def denoise_light(
     # Smooth the difference, and the luminance.
     clean, lowest = above - below, -np.float32(outlier) * below
     limited = np.clip(light.color, lowest, np.float32(outlier) * above)
-    guide = guide_of(geometry, np.where(where, geometry.shape_index, np.uint32(0)))
+    guide = guide_of(geometry, where)
     weights = Array3f(*REC709_LUMINANCE)
     luminance = dr.dot(lanes(above + below), weights)
     smoothed, variance = smooth(

@@ -74,5 +74,4 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
     # Sum up the estimates by entry.
     entries = Entries.joined([*parts, virtual])
     count += seen.count + gathered.count
-    metadata = {"rays": {"hash_grid": count.rays}, "dropped": count.dropped}
-    return Output({frame: entries}, metadata | {"entries": len(entries.keys)})
+    return Output({frame: entries}, {"rays": {"hash_grid": count.rays}, "dropped": count.dropped})

@@ -288,10 +288,10 @@ class Integrator:
     def _finish(
         self, light: Contributions, cache: IrradianceCache, deferred: _Deferred, on_miss: OnMiss | None
     ) -> None:
-        """Add what was deferred."""
+        """Add what was deferred; with `on_miss` the ends of paths are not wanted."""
         for found, lane in self._missed_light(cache, deferred, on_miss):
             light.add(found, lane)
-        if deferred.ends:
+        if deferred.ends and on_miss is None:
             ends = joined(deferred.ends)
             dr.eval(ends)
             light.add(self.kernels.terminate(ends), ends.lane)

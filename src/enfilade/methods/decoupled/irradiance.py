@@ -30,7 +30,7 @@ def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage
     Returns
     -------
     image : IrradianceImage
-        Its variance is that between images of independent random numbers.
+        Its variance is that of its paths, times :data:`NOISE_SHARE`.
     count : RayCount
     """
     walk, cache = shot.walk, shot.final_gather_cache(frame)

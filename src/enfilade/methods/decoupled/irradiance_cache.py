@@ -125,7 +125,7 @@ def upload(geometry: Geometry, irradiance: IrradianceImage) -> UploadedImage:
         for of in (irradiance.direct, irradiance.indirect)
     )
     if irradiance.indirect.variance.any():
-        guide = guide_of(geometry, np.where(irradiance.is_known, geometry.shape_index, np.uint32(0)))
+        guide = guide_of(geometry, irradiance.is_known)
         indirect = redistribute_fireflies(*indirect, guide, times=FIREFLY, levels=FIREFLY_LEVELS)
     return upload_layers(geometry, lanes(irradiance.is_known), [direct, indirect])
 
@@ -152,9 +152,8 @@ def accumulate(geometry: Geometry, is_known: Mask, images: Sequence[UploadedImag
         One layer, direct plus indirect, without variance: lookups do not read it.
     """
     layers, _ = _averaged(geometry, images, [1.0] * len(images))
-    groups = np.where(is_known, geometry.shape_index, np.uint32(0))
     smoothed = [
-        smooth_along(geometry, groups, *layer) if np.array(layer[1]).any() else layer for layer in layers
+        smooth_along(geometry, is_known, *layer) if np.array(layer[1]).any() else layer for layer in layers
     ]
     irradiance = sum((value for value, _ in smoothed), Array3f(0))
     return upload_layers(geometry, lanes(is_known), [(irradiance, Float(0))])

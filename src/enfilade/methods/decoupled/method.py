@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 from enfilade.camera.path import Segment
 from enfilade.methods.analysis import Analysis, keyframes_of
@@ -36,20 +35,6 @@ SPACING = 8  # of keyframes, frames
 SPECULAR_SHARE = 0.5  # of the cost of an excerpt's shading, for forecasts: 0 without specular lobes
 
 
-@dataclass(frozen=True)
-class _Kernels:
-    """The kernels of a renderer, which all shots share.
-
-    Attributes
-    ----------
-    renderer, integrator, virtual_images
-    """
-
-    renderer: LobeRenderer
-    integrator: Integrator
-    virtual_images: VirtualImages
-
-
 def _segments(analysis: Analysis) -> list[list[Segment]]:
     """Segments between the keyframes of each shot."""
     return analysis.segments(SPACING, spreads_rest=True)
@@ -77,7 +62,7 @@ class Decoupled(Method):
     )
 
     def __init__(self) -> None:
-        self._kernels: _Kernels | None = None
+        self._kernels: tuple[LobeRenderer, Integrator, VirtualImages] | None = None
         self._shot: ShotContext | None = None
         self._accumulation = TemporalAccumulation()
 
@@ -148,14 +133,12 @@ class Decoupled(Method):
 
     def _context_of(self, task: Task, inputs: Inputs, walk: Walkthrough) -> ShotContext:
         """The context of a task, which is kept until the next one begins."""
-        if self._kernels is None or self._kernels.renderer is not walk.renderer:
+        if self._kernels is None or self._kernels[0] is not walk.renderer:
             assert isinstance(walk.renderer, LobeRenderer)  # noqa: S101  (`needs_lobes`)
-            self._kernels = _Kernels(walk.renderer, Integrator(walk.renderer), VirtualImages(walk.renderer))
+            self._kernels = walk.renderer, Integrator(walk.renderer), VirtualImages(walk.renderer)
         if self._shot is None or not self._shot.is_of(task, inputs, walk):
             # Free memory before the next shot allocates.
             self._shot, self._accumulation = None, TemporalAccumulation()
             segments = _segments(inputs.analysis)[task.shot]
-            self._shot = ShotContext(
-                task.shot, segments, inputs, walk, self._kernels.integrator, self._kernels.virtual_images
-            )
+            self._shot = ShotContext(task.shot, segments, inputs, walk, *self._kernels[1:])
         return self._shot

@@ -19,8 +19,6 @@ from enfilade.methods.decoupled.surface_image import UploadedImage, lookup
 from enfilade.records import MIN_DIFFUSE_ALBEDO, SurfaceClass
 from enfilade.renderer import MAX_PATH_DEPTH, Branch, BsdfSample, LobeRenderer, ShadingPoint
 
-__all__ = ["ENTRY_PX", "PathKernels", "Vertex"]
-
 MAX_BOUNCES = MAX_PATH_DEPTH - 1  # off specular lobes; longer paths are path traced to their end
 # Russian roulette: paths survive with this times their throughput after the next bounce, if below one.
 ROULETTE_GAIN = 20.0
@@ -95,11 +93,7 @@ class PathKernels:
     """
 
     def __init__(self, renderer: LobeRenderer) -> None:
-        self._renderer = renderer
-
-        def state() -> Any:
-            return renderer.state
-
+        self._renderer, state = renderer, renderer.state
         self.probe = recorded(lambda guide, path: trace_probes(renderer, guide, path), state)
         self.see = recorded(self._see, state)
         self.see_aovs = recorded(self._see_aovs, state)

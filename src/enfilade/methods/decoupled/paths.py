@@ -14,8 +14,6 @@ from enfilade.kernels.random import PaddedSobolSampler
 from enfilade.kernels.replay import padded
 from enfilade.renderer import Bounce, Branch, Rays, ShadingPoint
 
-__all__ = ["Contributions", "Path", "compact", "joined", "merged", "scatter_add", "spawn"]
-
 
 @dataclass(frozen=True)
 class Path:

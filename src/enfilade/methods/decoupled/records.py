@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from enfilade.arrays import to_float
-from enfilade.records import F32, U8, Mask, Shading
+from enfilade.records import F32, U8, Mask, Shading, check_array
 
 F16 = npt.NDArray[np.float16]
 
@@ -24,6 +24,8 @@ class IrradianceImage:
         one, from emitters directly and by all other light; 0 where it was not estimated.
     is_known : (H, W) bool
         Pixels whose irradiance was estimated.
+
+    The variance of a denoised image is 0 everywhere; it is not smoothed again.
     """
 
     direct: Shading
@@ -31,8 +33,8 @@ class IrradianceImage:
     is_known: Mask
 
     def __post_init__(self) -> None:
-        if self.is_known.shape != self.direct.variance.shape:
-            raise ValueError(f"is_known is {self.is_known.shape}, expected {self.direct.variance.shape}")
+        check_array(self.is_known, self.direct.variance.shape, np.bool_, "is_known")
+        check_array(self.indirect.variance, self.direct.variance.shape, np.float32, "indirect.variance")
 
     def with_noise(self, share: float) -> IrradianceImage:
         """A copy with its variances multiplied by a factor."""
@@ -57,6 +59,10 @@ class SpecularAov:
     color: F16
     deviation: F16
 
+    def __post_init__(self) -> None:
+        check_array(self.color, (*self.deviation.shape, 3), np.float16, "color")
+        check_array(self.deviation, self.color.shape[:2], np.float16, "deviation")
+
 
 @dataclass(frozen=True, eq=False)
 class ShadedFrame:
@@ -80,6 +86,14 @@ class ShadedFrame:
     transmission: SpecularAov | None
     deviation: F16
     provenance: U8
+
+    def __post_init__(self) -> None:
+        size = self.provenance.shape
+        check_array(self.provenance, self.diffuse.shape[:2], np.uint8, "provenance")
+        check_array(self.diffuse, (*size, 3), np.float16, "diffuse")
+        check_array(self.deviation, size, np.float16, "deviation")
+        for aov in self.specular:
+            check_array(aov.deviation, size, np.float16, "deviation of a specular AOV")
 
     @property
     def specular(self) -> list[SpecularAov]:

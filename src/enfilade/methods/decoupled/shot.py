@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,6 @@ from enfilade.camera.path import CameraPath, Segment
 from enfilade.camera.pinhole import Camera
 from enfilade.kernels.estimate import Estimate, Radiance
 from enfilade.kernels.guiding import PathGuide
-from enfilade.kernels.reconstruction import ReconstructedEstimate
 from enfilade.methods.analysis import keyframes_of
 from enfilade.methods.base import Inputs, Task
 from enfilade.methods.decoupled.guiding import Regions
@@ -25,6 +25,7 @@ from enfilade.methods.decoupled.irradiance_cache import IrradianceCache, is_cove
 from enfilade.methods.decoupled.light_camera import virtual_camera
 from enfilade.methods.decoupled.path_kernels import ENTRY_PX
 from enfilade.methods.decoupled.paths import Path, spawn
+from enfilade.methods.decoupled.reconstruction import ReconstructedEstimate
 from enfilade.methods.decoupled.surface_image import UploadedImage, blank_image
 from enfilade.methods.decoupled.virtual_images import VirtualImages
 from enfilade.methods.walkthrough import Walkthrough
@@ -81,7 +82,7 @@ class ShotContext:
         """Whether its caches are valid for a task."""
         return self.number == task.shot and self.inputs is inputs and self.walk is walk
 
-    @property
+    @cached_property
     def renderer(self) -> LobeRenderer:
         """The renderer."""
         assert isinstance(self.walk.renderer, LobeRenderer)  # noqa: S101  (`Decoupled.needs_lobes`)
@@ -185,7 +186,7 @@ class ShotContext:
             *filled_up,
             self.hash_grid(frame),
             view=reprojected,
-            soft_only=self.renderer.has_sharp_light,
+            soft_only=self.renderer.has_sharp_light(),
             path_guide=self._path_guide(*nearest(self.walk.path, self.keyframes, frame, 1)),
         )
 

@@ -106,7 +106,6 @@ def _denoised(geometry: Geometry, aov: Shading, where: Mask) -> SpecularAov:
 def _filtered(geometry: Geometry, aov: Shading, where: Mask, weights: Any) -> SpecularAov:
     """Clamp the fireflies of an AOV by their weights, and smooth it along surfaces."""
     noise = NOISE_SHARE * lanes(aov.variance)
-    groups = np.where(where, geometry.shape_index, np.uint32(0))
-    color, variance = smooth_along(geometry, groups, weights * lanes(aov.color), noise)
+    color, variance = smooth_along(geometry, where, weights * lanes(aov.color), noise)
     deviation = np.sqrt(image(variance, *where.shape))
     return SpecularAov(to_half(image(color, *where.shape)), to_half(deviation))

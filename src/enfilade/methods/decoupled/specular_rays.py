@@ -13,7 +13,6 @@ import numpy as np
 
 from enfilade.arrays import to_float
 from enfilade.kernels.estimate import RayCount
-from enfilade.kernels.reconstruction import ReconstructedEstimate
 from enfilade.methods.decoupled.adaptive_sampling import (
     SPECULAR_CONTRAST,
     SPECULAR_DEVIATION,
@@ -22,6 +21,7 @@ from enfilade.methods.decoupled.adaptive_sampling import (
 from enfilade.methods.decoupled.edges import dilated, is_outline
 from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
+from enfilade.methods.decoupled.reconstruction import ReconstructedEstimate
 from enfilade.methods.decoupled.records import SpecularAov
 from enfilade.methods.decoupled.sample_counts import specular_spp
 from enfilade.methods.decoupled.shot import ShotContext

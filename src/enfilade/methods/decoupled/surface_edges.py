@@ -11,7 +11,7 @@ from enfilade.methods.decoupled.surface_image import PLANE_TOLERANCE
 from enfilade.records import Geometry, Mask
 
 CREASE_COSINE = 0.9  # between the normals of two pixels, below which they show different surfaces
-REACH = 2  # pixels to each side
+RADIUS_PX = 2
 # Of the 24 pixels around that show the same surface: a line of two pixels has 9, a straight edge 14.
 MIN_SUPPORT = 10
 MARGIN = 2  # pixels beside the edges of a surface that do not belong to its interior
@@ -43,8 +43,8 @@ def surface_edges(geometry: Geometry) -> tuple[Mask, Mask]:
     dr.eval(position)
 
     is_edge, support = Bool(False), UInt(0)
-    for down in range(-REACH, REACH + 1):
-        for across in range(-REACH, REACH + 1):
+    for down in range(-RADIUS_PX, RADIUS_PX + 1):
+        for across in range(-RADIUS_PX, RADIUS_PX + 1):
             if not (down or across):
                 continue
             # Pixels beyond the border count as the same surface.

@@ -19,7 +19,7 @@ PLANE_TOLERANCE = 0.01
 MIN_PLANE_COSINE = 0.1  # between normal and direction of view: at grazing angles that width is limited
 MIN_FOUND_WEIGHT = 0.02  # of all taps together, above which a surface counts as found
 SCALE = 1022.0  # of an axis of a packed normal; even, so that 0 stays 0
-MIN_TAP_WEIGHT = 1e-3  # of each valid tap: a single one at the border still counts
+MIN_TAP_WEIGHT = 1e-3  # of each valid tap
 TAPER = 0.125  # of an image's width or height, over which its weight falls towards its borders
 MIN_TAPER = 0.02  # of an image's weight at its borders, where it may be the only one that shows a surface
 

@@ -20,8 +20,6 @@ from enfilade.methods.decoupled.paths import Path, compact, merged, spawn
 from enfilade.records import Geometry, SurfaceClass
 from enfilade.renderer import LobeRenderer
 
-__all__ = ["IN_VIRTUAL_IMAGE", "VirtualImages"]
-
 IN_VIRTUAL_IMAGE = np.uint32(1 << 30)  # added to the index of shapes seen in mirrors or through glass
 CLEAR = SurfaceClass.TRANSPARENT
 IMAGING = (SurfaceClass.MIRROR, CLEAR)
@@ -40,7 +38,7 @@ class VirtualImages:
 
     def __init__(self, renderer: LobeRenderer) -> None:
         self._renderer = renderer
-        self._extend = recorded(self._extend_kernel, lambda: renderer.state)
+        self._extend = recorded(self._extend_kernel, renderer.state)
 
     def find(self, geometry: Geometry) -> list[Geometry]:
         """G-buffers of a frame with its virtual images: of reflections, and of what is seen through panes.

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
+import numpy as np
 
 from enfilade.arrays import Array3f, Float, Int, UInt, lanes, matrix3, opaque, pixel_grid
 from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.methods.decoupled.surface_image import PLANE_TOLERANCE, Layer
-from enfilade.records import U32, Geometry
+from enfilade.records import Geometry, Mask
 
 SPLINE = (1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0)  # cubic B-spline
 TINY = 1e-8
@@ -45,26 +46,26 @@ class Guide:
     height: int
 
 
-def guide_of(geometry: Geometry, groups: U32) -> Guide:
-    """Guide of the wavelet filter; pixels of different groups, (H, W) uint32, never mix."""
+def guide_of(geometry: Geometry, where: Mask) -> Guide:
+    """Guide of the wavelet filter; pixels of a mask, (H, W), mix with no others."""
     return Guide(
         depths=lanes(geometry.depth),
         normals=lanes(geometry.normal),
-        shape_indices=lanes(groups),
+        shape_indices=lanes(np.where(where, geometry.shape_index, np.uint32(0))),
         direction_from_pixel=matrix3(geometry.camera.direction_from_pixel),
         width=geometry.camera.width,
         height=geometry.camera.height,
     )
 
 
-def smooth_along(geometry: Geometry, groups: U32, color: Any, variance: Any) -> Layer:
+def smooth_along(geometry: Geometry, where: Mask, color: Any, variance: Any) -> Layer:
     """Smooth an image along its surfaces by the wavelet filter.
 
     Parameters
     ----------
     geometry
-    groups : (H, W) uint32
-        Only pixels of the same group mix.
+    where : (H, W) bool
+        Pixels that mix with no others.
     color : Array3f
         Image, width * height lanes.
     variance : Float
@@ -76,7 +77,7 @@ def smooth_along(geometry: Geometry, groups: U32, color: Any, variance: Any) -> 
     variance : Float
         Of the result.
     """
-    guide = guide_of(geometry, groups)
+    guide = guide_of(geometry, where)
     return smooth(color, variance, guide, levels=SMOOTHING_LEVELS, deviations=SMOOTHING_DEVIATIONS)
 
 

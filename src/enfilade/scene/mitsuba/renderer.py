@@ -134,14 +134,12 @@ class MitsubaRenderer:
             random=random,
         )
 
-    @property
     def why_inseparable(self) -> str:
-        """See :attr:`enfilade.renderer.LobeRenderer.why_inseparable`."""
+        """See :meth:`enfilade.renderer.LobeRenderer.why_inseparable`."""
         return why_inseparable(self._scene, self._integrator)
 
-    @property
     def state(self) -> Any:
-        """See :attr:`enfilade.renderer.LobeRenderer.state`."""
+        """See :meth:`enfilade.renderer.LobeRenderer.state`."""
         integrators = self._integrator, self._continued
         lights = self._transport.sharp_emitters.state
         lobes = self._lobes.state, self._lobes.specular_albedos
@@ -168,9 +166,8 @@ class MitsubaRenderer:
     def _photons(self) -> Photons:
         return trace_photons(self._scene)
 
-    @property
     def has_sharp_light(self) -> bool:
-        """See :attr:`enfilade.renderer.LobeRenderer.has_sharp_light`."""
+        """See :meth:`enfilade.renderer.LobeRenderer.has_sharp_light`."""
         return not self._transport.sharp_emitters.is_empty
 
     def intersect(

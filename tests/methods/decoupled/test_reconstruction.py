@@ -11,7 +11,7 @@ import pytest
 from enfilade.arrays import Array3f, matrix3
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.kernels.estimate import Estimate, Samples
-from enfilade.kernels.reconstruction import ReconstructedEstimate
+from enfilade.methods.decoupled.reconstruction import ReconstructedEstimate
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from twins.reconstruction import reconstructed
 
