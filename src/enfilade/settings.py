@@ -256,7 +256,7 @@ class MetricSettings(Section):
 
     table = "metric"
 
-    metering: Pursuit = option(
+    pursuit: Pursuit = option(
         Pursuit.BOTH, "Eye movements that compare assumes: smooth pursuit, none, or the worse."
     )
     mask_slope: float = option(0.7, "Slope of visual masking.", least=0.0, most=1.0)

@@ -284,7 +284,7 @@ class _Bench:
             "windows": [asdict(window) for window in self._windows],
             "references": [self._references.folder.name, *map(self._references.spp, frames)],
             **self._job.settings.to_tables([ViewingSettings]),
-            "metering": self._job.settings[MetricSettings].metering.value,
+            "pursuit": self._job.settings[MetricSettings].pursuit.value,
             "versions": [package_versions(), colorvideovdp.version()],
             "measuring": hashlib.sha256(b"".join(f.read_bytes() for f in sorted(MEASURING))).hexdigest(),
         }

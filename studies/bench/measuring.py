@@ -109,7 +109,7 @@ def measure(
     dict
         Values of the windows by measure.
     """
-    pursuit = job.settings[MetricSettings].metering
+    pursuit = job.settings[MetricSettings].pursuit
     viewing = job.viewing.cropped(windows[0].side, windows[0].side)
     exposure_ev = job.settings[ViewingSettings].exposure_ev
     others = [name for name in names if name != "cvvdp"]

@@ -101,7 +101,12 @@ def test_flags_without_effect_on_other_commands_are_refused(run, jobs, camera_pa
     prepare = ("render", "s.xml", "--path", camera_path, "--out", camera_path.parent / "run", "--prepare")
     for line, said in (
         (("encode", "run", "--set", "trace.seed=5"), "has no effect on a video, which does not read [trace]"),
-        (("compare", "a", "b", "--set", "trace.seed=1"), "has no effect on a comparison, which does not"),
+        (("encode", "run", "--set", "viewing.distance_m=1"), "on a video, which does not read distance_m"),
+        (
+            ("compare", "a", "b", "--set", "trace.seed=1"),
+            "has no effect on a comparison of mode modern, which",
+        ),
+        (("compare", "a", "b", "--set", "metric.mask_slope=0.3"), "modern, which does not read mask_slope"),
         ((*prepare, "--workers", "2"), "--workers has no effect with --prepare"),
         ((*prepare, "--threads", "0"), "--threads has no effect with --prepare"),
         ((*prepare, "--executor", "cloud"), "--executor has no effect with --prepare"),

@@ -90,7 +90,7 @@ def test_fast_motion_hides_what_is_seen_at_rest_by_a_resting_eye(sequence):
     reference = sequence("still", [textured()])
     moving = sequence("moving", [textured()], flow_px=40.0)
     test = sequence("test", [textured(0.2)])
-    scores = [compared(test, r, metering="none").score for r in (moving, reference)]
+    scores = [compared(test, r, pursuit="none").score for r in (moving, reference)]
     assert scores[0] < scores[1]
 
 

@@ -77,11 +77,11 @@ def terms(
     *,
     mode: str = "modern",
     flow: str = "auto",
-    metering: str = "both",
+    pursuit: str = "both",
     mask_slope: float = 0.7,
     **fields: Any,
 ) -> CompareOptions:
-    metric = MetricSettings.from_table({"metering": metering, "mask_slope": mask_slope})
+    metric = MetricSettings.from_table({"pursuit": pursuit, "mask_slope": mask_slope})
     return CompareOptions(metric=metric, mode=mode, flow=flow, **fields)
 
 

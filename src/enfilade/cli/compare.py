@@ -172,7 +172,8 @@ def _options(
     if len(layers) > 2:
         raise SettingsError(f"--layer is given {len(layers)} times; give it once, or for TEST and REFERENCE")
     settings = settings_of(ctx, SECTIONS)
-    check_effect(ctx, "a comparison", ViewingSettings, MetricSettings)
+    of_metric = () if mode == "paper" else ("pursuit",)
+    check_effect(ctx, f"a comparison of mode {mode}", {ViewingSettings: (), MetricSettings: of_metric})
     viewing = settings[ViewingSettings]
     return CompareOptions(
         viewing=viewing,

@@ -42,7 +42,7 @@ def command(
     Nothing is rendered, and the run stays as it is.
     """
     settings_of(ctx, SECTIONS)  # raises on wrong values
-    check_effect(ctx, "a video", VideoSettings, ViewingSettings)
+    check_effect(ctx, "a video", {VideoSettings: (), ViewingSettings: ("exposure_ev",)})
     tables = tables_of(ctx, SECTIONS)
     from enfilade.cli.progress import watch
     from enfilade.runs.encode import encode

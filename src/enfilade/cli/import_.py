@@ -84,7 +84,7 @@ def command(
     listed, with what it means in the picture. Scripts in the file are not run.
     """
     settings = settings_of(ctx, SECTIONS)
-    check_effect(ctx, "an import", BlenderSettings, LimitSettings)
+    check_effect(ctx, "an import", {BlenderSettings: (), LimitSettings: ()})
     if check_frames is not None and not checking["is_checked"]:
         raise SettingsError("--check-frames needs --check")
     blender = settings[BlenderSettings]

@@ -74,7 +74,7 @@ def _check_effect(ctx: click.Context, method: Method, scene: Path) -> None:
     own = BlenderSettings.table
     kinds: tuple[type[Section], ...] = (*COMMON, *method.settings)
     read = {kind.table for kind in kinds}
-    for flag, table in assigned(ctx).items():
+    for flag, (table, _) in assigned(ctx).items():
         if table == own and (scene.is_dir() or not is_importable(scene)):
             why = "which Blender does not import; leave it out"
             if scene.is_dir():

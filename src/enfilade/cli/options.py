@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import Field, fields
 from enum import Enum
 from pathlib import Path
@@ -294,11 +294,11 @@ def given_in(ctx: click.Context, kind: type[Section]) -> set[str]:
     return set(tables_of(ctx, (kind,)).get(kind.table, {}))
 
 
-def assigned(ctx: click.Context) -> dict[str, str]:
-    """Flags and assignments of this command, as typed, with the tables of their settings."""
+def assigned(ctx: click.Context) -> dict[str, tuple[str, str]]:
+    """Flags and assignments of this command, as typed, with the tables and names of their settings."""
     given = ctx.meta.get(_META, {})
-    named = {flag: kind.table for flag, (kind, _) in ALL_FLAGS.items() if flag in given}
-    return named | {f"--set {text}": _assignment(text)[0] for text in given.get("set", ())}
+    named = {flag: (kind.table, name) for flag, (kind, name) in ALL_FLAGS.items() if flag in given}
+    return named | {f"--set {text}": _assignment(text)[:2] for text in given.get("set", ())}
 
 
 def choose_device(device: Choice) -> None:
@@ -313,16 +313,27 @@ def choose_device(device: Choice) -> None:
         click.echo(f"note    rendered on the CPU: {note}", err=True)
 
 
-def check_effect(ctx: click.Context, what: str, *read: type[Section]) -> None:
-    """Refuse flags and assignments for sections that a command does not read; a file may have them.
+def check_effect(ctx: click.Context, what: str, read: Mapping[type[Section], Collection[str]]) -> None:
+    """Refuse flags and assignments of settings that a command does not read; a file may have them.
+
+    Parameters
+    ----------
+    ctx
+    what
+        It makes, for the message.
+    read
+        Names of settings by section; none: all of the section.
 
     Raises
     ------
     SettingsError
     """
-    for flag, table in assigned(ctx).items():
-        if table not in {kind.table for kind in read}:
+    known = {kind.table: names for kind, names in read.items()}
+    for flag, (table, name) in assigned(ctx).items():
+        if table not in known:
             raise SettingsError(f"{flag} has no effect on {what}, which does not read [{table}]")
+        if known[table] and name not in known[table]:
+            raise SettingsError(f"{flag} has no effect on {what}, which does not read {name}")
 
 
 def check_png(flag: str, file: Path | None) -> None:

@@ -185,7 +185,7 @@ def compare(
 class _Comparer:
     def __init__(self, viewing: Viewing, options: CompareOptions, count: int, *, is_moving: bool) -> None:
         self._viewing = viewing
-        pursuit = options.metric.metering
+        pursuit = options.metric.pursuit
         if options.mode == "paper":
             aqm = Aqm.paper(viewing, pursuit=pursuit, mask_slope=options.metric.mask_slope)
         else:
