@@ -4,7 +4,7 @@
 
 Runs or continues the bench of each scene and size, prints the geometric means of the ratios by split, and
 writes all results with date, machine and code as one JSON file, one page of tables and one of figures.
-Further options go to `python -m studies bench`, such as --reference-spp and --references.
+Further options go to `python -m studies bench`, such as --seeds, --reference-spp and --references.
 """
 
 import argparse
@@ -35,7 +35,6 @@ from studies.bench.tables import print_table, ratio_text
 
 FRAMES, MEASURED = 40, 8  # of a walkthrough; of them
 REFERENCE_SPP, LARGE_REFERENCE_SPP = "512", "128"  # a window of a large image has 13 times as many pixels
-SEEDS = "3"  # of enfilade's configurations; one of large images and of the quick bench
 
 
 def main() -> int:
@@ -48,7 +47,7 @@ def main() -> int:
         "--scene",
         nargs="+",
         choices=GENERATED,
-        help="generated scenes; all by default, three of large images",
+        help="generated scenes; all by default, two of large images",
     )
     parser.add_argument(
         "--scenes",
@@ -82,7 +81,6 @@ def main() -> int:
         except EnfiladeError as error:
             parser.error(str(error))
         defaults = ["--reference-spp", LARGE_REFERENCE_SPP if is_large else REFERENCE_SPP]  # a later one wins
-        defaults += ["--seeds", "1" if is_large or arguments.quick else SEEDS]
         is_chosen = any(option.startswith("--only") for option in options)
         only = QUICK if arguments.quick and not is_chosen else ()
         for case in cases:
