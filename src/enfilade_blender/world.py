@@ -17,6 +17,7 @@ from enfilade_blender.materials.graph import Graph
 from enfilade_blender.materials.image_pixels import fault, linear_pixels
 from enfilade_blender.materials.stand_ins import IMAGES, put_stand_ins
 from enfilade_blender.materials.table import VIEW_SOCKETS
+from enfilade_blender.materials.textures import ENVIRONMENT, RENDERED
 from enfilade_blender.materials.values import Constant, Emission, Nothing
 from enfilade_blender.motion import trees
 from enfilade_blender.notes import Notes
@@ -27,7 +28,7 @@ WIDTH, WIDTH_SUN, WIDTH_MAX = 1024, 2048, 4096
 SAMPLES, SAMPLES_SKY = 4, 16  # a pixel; the sun of a sky is smaller than one
 LOCAL_FROM_WORLD = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], np.float64)
 RAYS_OF_WORLDS = ("camera", "diffuse", "glossy", "transmission")
-FILE = "textures/environment.exr"
+FILE = f"textures/{ENVIRONMENT}.exr"
 
 
 def environment(selection: Selection, sun: Sun | None, folder: Path, notes: Notes) -> list[Element]:
@@ -136,19 +137,20 @@ def _rendered(world: Any, width: int, folder: Path, frame: int, notes: Notes) ->
     render.resolution_x, render.resolution_y, render.resolution_percentage = width, width // 2, 100
     settings = render.image_settings
     settings.file_format, settings.color_depth, settings.color_mode = "OPEN_EXR", "32", "RGB"
-    render.filepath = str(folder / "textures" / "rendered.exr")
+    file = folder / "textures" / f"{RENDERED}.exr"
+    render.filepath = str(file)
     cycles = scene.cycles
     cycles.samples = SAMPLES_SKY if has_sky else SAMPLES
     cycles.use_denoising = cycles.use_adaptive_sampling = False
     cycles.pixel_filter_type, cycles.sample_clamp_direct = "BOX", 0.0
     bpy.ops.render.render(write_still=True, scene=scene.name)
-    image = bpy.data.images.load(render.filepath)
+    image = bpy.data.images.load(str(file))
     image.colorspace_settings.name = "Non-Color"
     pixels = linear_pixels(image)[..., :3]
     bpy.data.images.remove(image)
     bpy.data.worlds.remove(scene.world)
     bpy.data.scenes.remove(scene)
-    (folder / "textures" / "rendered.exr").unlink()
+    file.unlink()
     return np.roll(pixels, -(width // 2), axis=1)
 
 
