@@ -24,6 +24,16 @@ def interface_ior(ior: float, level: float) -> float:
     return (1.0 + root) / (1.0 - root)
 
 
+def thin_ior(ior: float) -> float:
+    """Index of refraction of a pane that reflects as much along its normal as one interface of an index.
+
+    A pane whose sides reflect r each reflects 2 r / (1 + r).
+    """
+    reflectance = ((ior - 1.0) / (ior + 1.0)) ** 2
+    root = math.sqrt(reflectance / (2.0 - reflectance))
+    return (1.0 + root) / (1.0 - root)
+
+
 def conductor_ior(reflectance: np.ndarray, tint: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Complex index of refraction of a metal that reflects as Blender's does.
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from xml.etree import ElementTree as ET
 
+from enfilade_blender.materials import mapping
 from enfilade_blender.materials.bsdfs import (
     ALMOST,
     Context,
@@ -33,6 +34,7 @@ from enfilade_blender.scene_xml import Element, plugin
 
 ONE = Constant((1.0, 1.0, 1.0))
 BLACK = (0.0, 0.0, 0.0)
+SHARP = 0.03  # roughness of a pane below which its reflections are sharp
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,11 +173,14 @@ def _interface(below: Shader, above: Lobe, ior: float, context: Context) -> Surf
         what, effect = "the normals of the glossy layer are left out", "its reflections are even"
         context.notes.add("not-carried", context.owner, above.name, what, effect)
     if isinstance(below, Lobe) and below.kind == "transparent":
+        if max(context.textures.mean(above.roughness)) >= SHARP:
+            what, effect = "the roughness of reflections is left out", "they are sharp"
+            context.notes.add("approximated", context.owner, above.name, what, effect)
         tints = {
             "specular_reflectance": context.textures.colour(above.colour),
             "specular_transmittance": context.textures.colour(below.colour),
         }
-        return Surface(plugin("bsdf", "thindielectric", int_ior=ior, ext_ior=1.0, **tints))
+        return Surface(plugin("bsdf", "thindielectric", int_ior=mapping.thin_ior(ior), ext_ior=1.0, **tints))
     surface = build(below, context)
     tint = context.textures.mean(above.colour)
     return replace(surface, bsdf=layered(surface.plain(), ONE, ior, above.roughness, tint, context))
