@@ -30,7 +30,7 @@ def of_integrator(folder, integrator, inside=DIFFUSE):
         ('<integrator type="volpath"/>', DIFFUSE, ""),
         ("", DIFFUSE, ""),
         ('<integrator type="direct"/>', DIFFUSE, "DirectIntegrator, not a path tracer"),
-        (f'<integrator type="path">{THREE}</integrator>', DIFFUSE, "depth 3; 5 is the least"),
+        (f'<integrator type="path">{THREE}</integrator>', DIFFUSE, "depth 3 (--max-depth 5 or"),
         (HIDDEN.format("path"), DIFFUSE, "hides"),
         ('<integrator type="volpath"/>', f'<bsdf type="null"/>{FOG}', "participating media"),
         ('<integrator type="path"/>', f'<bsdf type="dielectric"/>{FOG}', ""),  # which it never looks at

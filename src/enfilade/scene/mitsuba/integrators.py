@@ -63,7 +63,7 @@ def why_inseparable(scene: Any, integrator: Any) -> str:
         return "its integrator hides the emitters"
     max_depth, _ = _depths(integrator)
     if max_depth <= MAX_PATH_DEPTH:
-        return f"its paths end at depth {max_depth}; {MAX_PATH_DEPTH + 1} is the least"
+        return f"its paths end at depth {max_depth} (--max-depth {MAX_PATH_DEPTH + 1} or more continues them)"
     if is_volumetric(integrator) and has_media(scene):
         return "it has participating media"
     return ""
