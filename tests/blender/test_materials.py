@@ -173,7 +173,9 @@ def test_a_mix_with_transparent_by_the_kind_of_ray_is_its_other_side(blender):
     assert ray["effect"] == "all rays see it as those do in Blender for which that is 0"
 
 
-@pytest.mark.parametrize("name", ["leaves", "lamps_in_the_way", "tilted", "painted_lamps"])
+@pytest.mark.parametrize(
+    "name", ["leaves", "lamps_in_the_way", "tilted", "painted_lamps", "single_scattering"]
+)
 def test_light_is_that_of_cycles(blender, name):
     (source,) = blender.make(name)
     code, out, result = blender.job(source, name)

@@ -1,5 +1,6 @@
 """Surfaces of shaders, without Blender."""
 
+from dataclasses import replace
 from xml.etree import ElementTree as ET
 
 import drjit as dr
@@ -10,7 +11,7 @@ import pytest
 from enfilade_blender.materials.bsdfs import Context
 from enfilade_blender.materials.surfaces import build
 from enfilade_blender.materials.textures import Textures
-from enfilade_blender.materials.values import Constant, Lobe, Mix
+from enfilade_blender.materials.values import Constant, Lobe, Mix, Principled
 from enfilade_blender.notes import Notes
 
 WHITE = Constant((1.0, 1.0, 1.0))
@@ -47,3 +48,26 @@ def test_a_thin_pane_passes_what_fresnels_factor_does_not_reflect(context, rough
     share = passed(Mix(Constant((0.5,)), CLEAR, gloss, 1.8, "mix"), context)
     assert share == pytest.approx(1.0 - (0.8 / 2.8) ** 2, abs=1e-4)
     assert noted(context) == notes
+
+
+GREY, ROUGH = Constant((0.5, 0.5, 0.5)), Constant((0.9,))
+METAL = {"Base Color": GREY, "Metallic": Constant((1.0,)), "Roughness": ROUGH}
+
+
+@pytest.mark.parametrize(
+    ("shader", "name", "own"),
+    [
+        (Lobe("glossy", GREY, "lobe", ROUGH), "specular_reflectance", 0.5),
+        (Lobe("glass", GREY, "lobe", ROUGH, Constant((1.5,))), "specular_transmittance", 0.5),
+        (Principled(METAL, None, "metal"), "specular_reflectance", 1.0),
+    ],
+)
+def test_microfacets_of_single_scattering_have_no_gain(context, shader, name, own):
+    tints = []
+    for is_multiple in (True, False):
+        bsdf = build(replace(shader, is_multiple=is_multiple), context).plain()
+        (tint,) = bsdf.findall(f"*[@name='{name}']")
+        numbers = tint.get("value") or tint.find("vector").get("x")
+        tints.append(float(numbers.split()[0]))
+    assert tints[0] > 1.2 * own
+    assert tints[1] == own

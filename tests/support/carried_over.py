@@ -28,7 +28,7 @@ PRINCIPLED = (
     (
         "Roughness",
         "mapped",
-        "GGX, alpha its square; multiple scattering is added, but for metals and glass of textured colour",
+        "GGX, alpha its square; with multiple scattering if Multiscatter, but for textured metals and glass",
     ),
     (
         "Roughness of 0.8 and more without Metallic",
@@ -236,6 +236,11 @@ def markdown():
             "an `area` emitter beside the other shader; else `blendbsdf` of equal shares",
         ),
         ("Emission", "mapped", "`area` emitter"),
+        (
+            "Beckmann, Ashikhmin-Shirley",
+            "approximated",
+            "GGX of single scattering: highlights fade out further away",
+        ),
         ("Any other shader", "not carried", "a neutral grey"),
     ]
     sections = {

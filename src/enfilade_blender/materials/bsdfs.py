@@ -62,10 +62,14 @@ def lobe_bsdf(lobe: Lobe, context: Context) -> Element:
     """BSDF of a closure with one lobe."""
     match lobe.kind:
         case "glossy":
-            bsdf = conductor_bsdf(lobe.colour, lobe.roughness, {}, context, edge=None)
+            bsdf = conductor_bsdf(
+                lobe.colour, lobe.roughness, {}, context, edge=None, is_multiple=lobe.is_multiple
+            )
         case "glass":
             ior = Constant(context.textures.mean(lobe.ior)).number
-            bsdf = glass_bsdf(lobe.colour, lobe.colour, lobe.roughness, ior, context)
+            bsdf = glass_bsdf(
+                lobe.colour, lobe.colour, lobe.roughness, ior, context, is_multiple=lobe.is_multiple
+            )
         case "translucent":  # diffuse transmission alone: the thin principled BSDF without an interface
             thin = {"diff_trans": 2.0, "eta": NO_INTERFACE, "roughness": 0.5}
             bsdf = plugin("bsdf", "principledthin", base_color=context.textures.colour(lobe.colour), **thin)
@@ -151,9 +155,13 @@ def is_zero(value: Value) -> bool:
 
 
 def glass_bsdf(
-    transmitted: Value | Element, reflected: Value, roughness: Value, ior: float, context: Context
-) -> Element:
-    """Glass of two tints; of rough glass, constant ones restore the energy that single scattering loses."""
+    transmitted: Value | Element, reflected: Value, roughness: Value, ior: float, context: Context,
+    *, is_multiple: bool,
+) -> Element:  # fmt: skip
+    """Glass of two tints; of rough glass, constant ones restore the energy that single scattering loses.
+
+    Without `is_multiple` Blender loses it, too.
+    """
     ior = ior if abs(ior - 1.0) > 1e-3 else 1.001
     alpha = _alpha(roughness, context)
     tints: dict[str, Property] = {}
@@ -161,7 +169,7 @@ def glass_bsdf(
     for number, (name, value) in enumerate(values.items()):
         tint: Property
         if isinstance(value, Constant):
-            gain = partial(_glass_gain, ior, number)
+            gain = partial(_glass_gain, ior, number, is_multiple=is_multiple)
             tint = _gained(value.colour, gain, alpha, roughness, f"{name} {ior:.3g}", context)
         else:
             tint = value if isinstance(value, Element) else context.textures.colour(value)
@@ -170,15 +178,18 @@ def glass_bsdf(
     return _microfacets("dielectric", alpha, int_ior=ior, ext_ior=1.0, **tints)
 
 
-def _glass_gain(ior: float, number: int, alpha: float) -> float:
-    return ggx.glass_gains(round(alpha, 3), round(ior, 3))[number]
+def _glass_gain(ior: float, number: int, alpha: float, *, is_multiple: bool) -> float:
+    return ggx.glass_gains(round(alpha, 3) * is_multiple, round(ior, 3))[number]
 
 
 def conductor_bsdf(
     reflectance: Value, roughness: Value, extra: dict[str, Property], context: Context,
-    *, edge: tuple[float, float, float] | None,
+    *, edge: tuple[float, float, float] | None, is_multiple: bool,
 ) -> Element:  # fmt: skip
-    """A metal, whose index of refraction is fitted where there are an edge tint and a constant colour."""
+    """A metal, whose index of refraction is fitted where there are an edge tint and a constant colour.
+
+    Without `is_multiple` it loses light between its microfacets, as in Blender.
+    """
     alpha = _alpha(roughness, context)
     optics: dict[str, Property] = {"material": "none"}
     if isinstance(reflectance, Constant):
@@ -189,7 +200,7 @@ def conductor_bsdf(
             optics, tint = {"eta": _unbounded(eta), "k": _unbounded(k)}, np.ones(3)
 
         def gain(alpha: float) -> np.ndarray:
-            return np.array([ggx.metal_scale(float(c), alpha) for c in r])
+            return np.array([ggx.metal_scale(float(c), alpha * is_multiple) for c in r])
 
         name = "metal" + "".join(f" {c:.3g}" for c in r)
         optics["specular_reflectance"] = _gained(_unbounded(tint), gain, alpha, roughness, name, context)

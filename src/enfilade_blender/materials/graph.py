@@ -36,6 +36,7 @@ from enfilade_blender.notes import Notes
 
 ZERO = Constant((0.0,))
 DIELECTRIC_IOR = 1.45
+MULTIPLE, OTHER_DISTRIBUTIONS = "MULTI_GGX", ("BECKMANN", "ASHIKHMIN_SHIRLEY")  # of microfacets
 
 
 class Graph:
@@ -115,7 +116,8 @@ class Graph:
         if "Emission Color" in inputs:
             inputs["Emission Color"] = _baked(inputs["Emission Color"])
         self._note_coat_normal(node, groups)
-        return Principled(inputs, self.normal(node.inputs["Normal"], groups), node.name)
+        normal = self.normal(node.inputs["Normal"], groups)
+        return Principled(inputs, normal, node.name, node.distribution == MULTIPLE)
 
     def _mix(self, node: Any, groups: tuple[Any, ...]) -> Shader:
         factor = follow(node.inputs[0], groups)
@@ -209,8 +211,12 @@ class Graph:
 
         colour = named("Base Color" if "Base Color" in node.inputs else "Color", (0.8, 0.8, 0.8))
         normal = self.normal(node.inputs["Normal"], groups) if "Normal" in node.inputs else None
-        ior = named("IOR", (DIELECTRIC_IOR,))
-        return Lobe(kind.lobe, colour, node.name, named("Roughness", (0.0,)), ior, normal)
+        ior, roughness = named("IOR", (DIELECTRIC_IOR,)), named("Roughness", (0.0,))
+        distribution = getattr(node, "distribution", MULTIPLE)
+        if distribution in OTHER_DISTRIBUTIONS and roughness != ZERO:
+            what, effect = f"its distribution {distribution} is GGX", "highlights fade out further away"
+            self._notes.add("approximated", self._owner, node.name, what, effect)
+        return Lobe(kind.lobe, colour, node.name, roughness, ior, normal, distribution == MULTIPLE)
 
     def _fresnel(self, socket: Any, groups: tuple[Any, ...]) -> float | None:
         """IOR of a factor that is Fresnel's reflectance."""

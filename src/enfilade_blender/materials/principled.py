@@ -48,7 +48,10 @@ def principled_bsdf(shader: Principled, context: Context) -> Element:
 def _glass(shader: Principled, context: Context) -> Element:
     # Twice through an interface is once through the colour.
     tint = context.textures.root(shader["Base Color"])
-    return glass_bsdf(tint, Constant(WHITE), shader["Roughness"], shader.number("IOR"), context)
+    return glass_bsdf(
+        tint, Constant(WHITE), shader["Roughness"], shader.number("IOR"), context,
+        is_multiple=shader.is_multiple,
+    )  # fmt: skip
 
 
 def _metal(shader: Principled, context: Context) -> Element:
@@ -59,7 +62,9 @@ def _metal(shader: Principled, context: Context) -> Element:
         aspect = (1.0 - 0.9 * anisotropy) ** 0.5
         alpha = max(clipped(roughness.number) ** 2, ALPHA_MIN)
         extra = {"alpha_u": alpha / aspect, "alpha_v": alpha * aspect}
-    return conductor_bsdf(shader["Base Color"], roughness, extra, context, edge=edge)
+    return conductor_bsdf(
+        shader["Base Color"], roughness, extra, context, edge=edge, is_multiple=shader.is_multiple
+    )
 
 
 def _note_principled(shader: Principled, context: Context) -> None:

@@ -167,11 +167,12 @@ Normal = NormalMap | Bump | ProceduralNormal | None
 
 @dataclass(frozen=True)
 class Principled:
-    """Blender's Principled BSDF; `inputs` by their names."""
+    """Blender's Principled BSDF; `inputs` by their names. For `is_multiple` see :class:`Lobe`."""
 
     inputs: dict[str, Value]
     normal: Normal
     name: str
+    is_multiple: bool = True
 
     def __getitem__(self, name: str) -> Value:
         """Value of an input."""
@@ -195,6 +196,8 @@ class Lobe:
     name : str
         Of the node.
     roughness, ior, normal
+    is_multiple : bool
+        Light that is scattered several times between microfacets is not lost.
     """
 
     kind: str
@@ -203,6 +206,7 @@ class Lobe:
     roughness: Value = Constant((0.0,))
     ior: Value = Constant((1.0,))
     normal: Normal = None
+    is_multiple: bool = True
 
 
 @dataclass(frozen=True)

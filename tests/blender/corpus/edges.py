@@ -174,6 +174,15 @@ def tilted(_folder):
     plane("tilted", (0.0, 0.0, -1.0), 60.0, material)
 
 
+def single_scattering(_folder):
+    """A rough metal of single scattering, in even light."""
+    new_file()
+    world((0.5, 0.5, 0.5))
+    gold, _, bsdf = shader("gold", "BsdfAnisotropic", Color=(0.8, 0.6, 0.3, 1.0), Roughness=0.7)
+    bsdf.distribution = "GGX"
+    plane("gold", (0.0, 0.0, 0.0), 60.0, gold).rotation_euler.x = math.pi / 2
+
+
 def lamp_nodes(_folder):
     """Lamps whose nodes are more than numbers."""
     new_file()
