@@ -114,8 +114,9 @@ def test_a_coloured_roughness_is_its_luminance(made):
 
 def test_transparency_that_is_lost_is_noted(made):
     _, elements, notes = made
-    assert "see-through" not in elements  # the shape is invisible
-    assert notes["see-through"] == ["the colour of transparency is left out"]
+    opacity = elements["material see-through"].find("float[@name='opacity']").get("value")
+    assert float(opacity) == pytest.approx(1.0 - (0.2 * 0.2127 + 0.5 * 0.7152 + 0.9 * 0.0722), abs=1e-3)
+    assert notes["see-through"] == ["the tint of transparency is left out"]
     assert notes["sheer gloss"] == ["a sum of two BSDFs is a mix of equal shares"]
     kinds = [e.get("type") for e in elements["material sheer gloss"].iter("bsdf")]
     assert kinds == ["blendbsdf", "mask", "twosided", "diffuse", "twosided", "roughconductor"]

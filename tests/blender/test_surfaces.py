@@ -71,3 +71,17 @@ def test_microfacets_of_single_scattering_have_no_gain(context, shader, name, ow
         tints.append(float(numbers.split()[0]))
     assert tints[0] > 1.2 * own
     assert tints[1] == own
+
+
+@pytest.mark.parametrize(
+    ("colour", "share", "notes"),
+    [
+        ((1.0, 1.0, 1.0), 1.0, []),
+        ((0.25, 0.25, 0.25), 0.25, []),
+        ((0.0, 0.0, 0.0), 0.0, []),
+        ((0.0, 1.0, 0.0), 0.7152, ["the tint of transparency is left out"]),
+    ],
+)
+def test_transparency_passes_its_luminance(context, colour, share, notes):
+    assert passed(replace(CLEAR, colour=Constant(colour)), context) == pytest.approx(share, abs=1e-3)
+    assert noted(context) == notes

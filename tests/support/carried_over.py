@@ -8,7 +8,7 @@ BECOMES = {  # shader nodes of one lobe
     "BSDF_METALLIC": "`conductor` or `roughconductor`",
     "BSDF_GLASS": "`dielectric` or `roughdielectric`",
     "BSDF_REFRACTION": "`dielectric` or `roughdielectric`",
-    "BSDF_TRANSPARENT": "`mask`",
+    "BSDF_TRANSPARENT": "`mask`: alone it passes the luminance of its colour, in mixes and sums all light",
     "BSDF_TRANSLUCENT": "`principledthin`",
     "SUBSURFACE_SCATTERING": "`diffuse`",
     "BSDF_SHEEN": "`diffuse`",

@@ -109,6 +109,13 @@ def _other(bsdf: Element, than: Element) -> Element | None:
 
 def build(shader: Shader, context: Context) -> Surface:
     """Surface of a shader whose procedural values are baked."""
+    if isinstance(shader, Lobe) and shader.kind == "transparent":
+        return _veil(shader, context)
+    return _part(shader, context)
+
+
+def _part(shader: Shader, context: Context) -> Surface:
+    """Surface of a shader that may be a part of another, in which transparency has no colour."""
     if isinstance(shader, Nothing):
         return Surface(None)
     if isinstance(shader, Emission):
@@ -137,6 +144,17 @@ def inverted(value: Value, context: Context) -> float | Element:
     return 0.5
 
 
+def _veil(lobe: Lobe, context: Context) -> Surface:
+    """Transparency alone: black that passes the luminance of its colour."""
+    mean = context.textures.mean(lobe.colour)
+    if max(mean) - min(mean) > 1.0 - ALMOST:
+        what, effect = "the tint of transparency is left out", "what lies behind is dimmed, but not tinted"
+        context.notes.add("not-carried", context.owner, lobe.name, what, effect)
+    if isinstance(lobe.colour, Constant):
+        return Surface(None, opacity=Constant((1.0 - lobe.colour.number,)))
+    return Surface(None, opacity=lobe.colour, opacity_is_inverted=True)
+
+
 def _transparent(lobe: Lobe, context: Context) -> Surface:
     if not isinstance(lobe.colour, Constant) or min(lobe.colour.colour) < ALMOST:
         what, effect = (
@@ -150,10 +168,10 @@ def _transparent(lobe: Lobe, context: Context) -> Surface:
 def _mix(mix: Mix, context: Context) -> Surface:
     """A mix, by what its parts are: a cut-out, a coated surface, thin glass, a light, or two BSDFs."""
     if is_zero(mix.factor) or is_one(mix.factor):
-        return build(mix.second if is_one(mix.factor) else mix.first, context)
+        return _part(mix.second if is_one(mix.factor) else mix.first, context)
     if mix.fresnel_ior is not None and isinstance(mix.second, Lobe):
         return _interface(mix.first, mix.second, mix.fresnel_ior, context)
-    first, second = build(mix.first, context), build(mix.second, context)
+    first, second = _part(mix.first, context), _part(mix.second, context)
     if first.is_invisible and not first.emitted:
         return _cut_out(second, mix.factor, mix.name, context)
     if second.is_invisible and not second.emitted:
@@ -181,7 +199,7 @@ def _interface(below: Shader, above: Lobe, ior: float, context: Context) -> Surf
             "specular_transmittance": context.textures.colour(below.colour),
         }
         return Surface(plugin("bsdf", "thindielectric", int_ior=mapping.thin_ior(ior), ext_ior=1.0, **tints))
-    surface = build(below, context)
+    surface = _part(below, context)
     tint = context.textures.mean(above.colour)
     return replace(surface, bsdf=layered(surface.plain(), ONE, ior, above.roughness, tint, context))
 
@@ -222,7 +240,7 @@ def _blended(first: Surface, second: Surface, mix: Mix, context: Context) -> Sur
 
 
 def _sum(add: Add, context: Context) -> Surface:
-    first, second = build(add.first, context), build(add.second, context)
+    first, second = _part(add.first, context), _part(add.second, context)
     emitted = _joined([*first.emitted, *second.emitted], add, context)
     if first.bsdf is None and not first.is_invisible:
         return replace(second, emitted=emitted)
