@@ -78,9 +78,8 @@ def export(job: Job) -> dict[str, Any]:
         effect = "every frame would be black: add a lamp, or a world with light"
         notes.add("not-carried", selection.scene.name, "Light", "there is no light", effect)
     shapes.textures.remove_unused(elements)
-    write_scene(
-        job.out / "scene.xml", [_integrator(selection, shapes.kinds, is_volumetric=is_volumetric), *elements]
-    )
+    integrator = _integrator(selection, shapes.kinds, notes, is_volumetric=is_volumetric)
+    write_scene(job.out / "scene.xml", [integrator, *elements])
     counts = {
         "objects": len(evaluated.placed),
         "instances": evaluated.instances,
@@ -114,7 +113,7 @@ def _facts(job: Job, selection: Selection) -> dict[str, Any]:
     }
 
 
-def _integrator(selection: Selection, kinds: set[str], *, is_volumetric: bool) -> Element:
+def _integrator(selection: Selection, kinds: set[str], notes: Notes, *, is_volumetric: bool) -> Element:
     """A path tracer with the file's limit of bounces.
 
     Cycles limits bounces by kind. A path of many diffuse bounces ends by their own limit, which is the
@@ -125,4 +124,9 @@ def _integrator(selection: Selection, kinds: set[str], *, is_volumetric: bool) -
     bounces = min(cycles.max_bounces, max(cycles.diffuse_bounces, cycles.glossy_bounces))
     if kinds & GLASS:
         bounces = min(cycles.max_bounces, bounces + 2)
+        through = min(cycles.max_bounces, cycles.transmission_bounces)
+        if through > bounces:
+            what = f"paths through glass end after {bounces} bounces, in Blender after {through}"
+            effect = "what is seen or lit through several panes is darker"
+            notes.add("approximated", selection.scene.name, "Light Paths: Transmission", what, effect)
     return plugin("integrator", "volpath" if is_volumetric else "path", max_depth=bounces + 2)

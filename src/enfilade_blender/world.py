@@ -49,6 +49,11 @@ def environment(selection: Selection, sun: Sun | None, folder: Path, notes: Note
         what = f"an environment map of {image.shape[1]}x{image.shape[0]}"
         notes.add("baked", world.name, "World", what, "detail is limited to its pixels")
     if sun is not None:
+        least = _narrowest(image.shape[1])
+        if sun.angle < least:
+            angle, shown = (f"{math.degrees(a):.2g} degrees" for a in (sun.angle, least))
+            what, effect = f"its angle of {angle} is {shown} in the environment map", "its shadows are softer"
+            notes.add("approximated", sun.name, "Angle", what, effect)
         image += sun_disc(sun, image.shape[1])
     write_exr(folder / FILE, image)
     return [plugin("emitter", "envmap", filename=FILE, to_world=np.linalg.inv(LOCAL_FROM_WORLD))]
@@ -59,7 +64,7 @@ def sun_disc(sun: Sun, width: int) -> F32:
 
     Pixels at its edge hold the part of them that is covered, of 8x8 points.
     """
-    half = max(0.5 * sun.angle, 2.0 * math.pi / width)
+    half = 0.5 * max(sun.angle, _narrowest(width))
     height, fine = width // 2, 8
     toward = sun.direction
     row = math.acos(float(np.clip(toward[2], -1.0, 1.0))) / math.pi * height
@@ -75,6 +80,11 @@ def sun_disc(sun: Sun, width: int) -> F32:
     image = np.zeros((height, width, 3), np.float32)
     image[rows] = inside[..., None] * np.array(sun.irradiance) / max(weight, 1e-12)
     return image
+
+
+def _narrowest(width: int) -> float:
+    """Least angle of a sun's disc: two pixels."""
+    return 4.0 * math.pi / width
 
 
 def _pixel_cosine(rows: np.ndarray, width: int, toward: np.ndarray) -> np.ndarray:

@@ -310,6 +310,11 @@ def test_soft_falloff_is_noted_of_lamps_near_surfaces(exported):
     assert all(note["effect"].endswith("at 0.5 units by 25%") for note in found)
 
 
+def test_a_sun_narrower_than_texels_of_the_environment_is_widened_and_noted(exported):
+    found = notes(exported("near_lamps")[1], "approximated")
+    assert ("Narrow", "its angle of 0.057 degrees is 0.35 degrees in the environment map") in found
+
+
 def test_notes_cast_fewer_rays_at_more_objects(blender):
     counts = {}
     for objects in (100, 20_000, 1_000_000):
@@ -384,6 +389,7 @@ def test_settings_that_are_left_out_are_noted(exported):
         ("matcap, matcap", "it depends on the view"),
         ("islands", "its Random Per Island are other numbers than in Cycles"),
         ("stained", grey),
+        ("Scene", "paths through glass end after 6 bounces, in Blender after 12"),
         ("Scene", "the scene is read as Cycles has it, not WORKBENCH"),
     }
     assert ("broken", "a number that is NaN or infinite is taken as 0") in notes(result, "approximated")

@@ -135,7 +135,7 @@ LIGHTS = (
         "`rectangle` or `disk`; not seen by the camera",
     ),
     ("Sun of angle 0, or beside another sun", "mapped", "`directional`"),
-    ("Sun with an angle", "mapped", "a disc in the environment map"),
+    ("Sun with an angle", "mapped", "a disc in the environment map, at least two of its pixels wide"),
     (
         "Nodes of lights: emissions of constants and what is computed of them, sums, mixes, Light Falloff",
         "mapped",

@@ -223,11 +223,12 @@ def _lamp_of_nodes(name):
 
 
 def near_lamps(_folder):
-    """Lamps of soft falloff, on by default, near a floor and not, seen by a camera with shear."""
+    """Lamps of soft falloff, on by default, near a floor and not, a narrow sun, and a camera with shear."""
     eye = new_file().camera
     eye.parent = rig = add("Rig", None)
     rig.scale, eye.rotation_euler.z = (1.5, 1.0, 1.0), 0.7
     plane("Floor", (0.0, 0.0, 0.0), 20.0, principled("floor"))
+    light("SUN", "Narrow", (0.0, 0.0, 5.0), 1.0, angle=1e-3)
     light("POINT", "Near", (0.0, 0.0, 0.5), 10.0, shadow_soft_size=0.25)
     light("POINT", "Hard", (1.0, 0.0, 0.5), 10.0, shadow_soft_size=0.25, use_soft_falloff=False)
     light("POINT", "Far", (2.0, 0.0, 1.0), 10.0, shadow_soft_size=0.25)
