@@ -48,7 +48,8 @@ class EnfiladeSettings(bpy.types.PropertyGroup):
 def command_of(context: Any) -> str:
     """The program of the preferences."""
     found = context.preferences.addons.get(__package__)
-    return str(found.preferences.command) if found and found.preferences else "enfilade"
+    command = found.preferences.command if found and found.preferences else "enfilade"
+    return str(bpy.path.abspath(command))
 
 
 def run_folder(context: Any) -> Path:

@@ -117,10 +117,12 @@ def test_the_manifest_is_complete():
 
 SESSION = """
 import json, os, sys, time
+from types import SimpleNamespace as Record
 sys.path.insert(0, sys.argv[1])
 import bpy, blender_addon
 folder, program = sys.argv[2:]
 blender_addon.register()
+own = blender_addon.command_of
 blender_addon.command_of = lambda context: program
 said = []
 settings = bpy.context.scene.enfilade
@@ -132,6 +134,8 @@ def call(**settings):
         return str(error)
 said.append(call())
 bpy.ops.wm.save_as_mainfile(filepath=os.path.join(folder, "shot.blend"))
+given = Record(preferences=Record(command="//../bin/enfilade"))
+said.append(own(Record(preferences=Record(addons={"blender_addon": given}))))
 os.mkdir(os.path.join(folder, "run"))
 said.append(call(is_new=True))
 said.append(bpy.ops.enfilade.render.poll())
@@ -160,6 +164,7 @@ def test_the_panel_runs_the_command_in_blender(program, tmp_path):
     )
     said = json.loads(next(row for row in done.stdout.splitlines() if row.startswith("said"))[5:])
     assert "Save the file first" in said[0]
+    assert said.pop(1) == f"{tmp_path}/../bin/enfilade"
     assert said[1:] == [["FINISHED"], False, True, "no camera", True, False], done.stderr
     arguments = (tmp_path / "arguments").read_text().splitlines()
     assert arguments[:6] == [
