@@ -108,6 +108,11 @@ class Mesh:
         edges = np.diff(self.positions[self.triangles], axis=1)
         return float(0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=-1).sum())
 
+    def uv_area(self, uv: str) -> float:
+        """Area in a UV map, of triangles that overlap each by itself."""
+        edges = np.diff(self.uvs[uv], axis=1)
+        return float(0.5 * np.abs(np.linalg.det(edges)).sum())
+
     def mirrored(self, uv: str) -> npt.NDArray[np.bool_]:
         """Triangles (N,) on which a UV map is mirrored, as seen from where the normals point."""
         edges = np.diff(self.positions[self.triangles], axis=1)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,6 +19,7 @@ from enfilade_blender.materials.surfaces import Surface, build
 from enfilade_blender.materials.textures import Textures, file_stem
 from enfilade_blender.materials.values import (
     AttributeValue,
+    Bump,
     Constant,
     ImageValue,
     Lobe,
@@ -273,10 +275,11 @@ class Shapes:
         """Id of a BSDF, and its surface; `is_mirrored` as its normal maps."""
         material, part = of.part.material, of.part.name
         owner = of.part if of.is_own else None
-        key = material.name_full if material else "", is_mirrored, of.is_back_seen, owner
+        density = _uv_density(of)
+        key = material.name_full if material else "", is_mirrored, of.is_back_seen, owner, density
         if key in self._surfaces:
             return self._surfaces[key]
-        context = self._context(material, is_mirrored=is_mirrored)
+        context = replace(self._context(material, is_mirrored=is_mirrored), uv_density=density)
         surface = build(of.shader, context)
         back = build(of.shader, replace(context, is_back=True)) if of.is_back_seen else None
         element = surface.element(context, back)
@@ -330,6 +333,17 @@ def _maps(shader: Shader, mesh: Mesh) -> tuple[str | None, str | None]:
         if isinstance(value, AttributeValue):
             attribute = value.name or mesh.active_colour
     return uv, attribute
+
+
+def _uv_density(of: _Material) -> float:
+    """Texture coordinates for each scene unit, where bumps depend on it: rounded, as meshes share BSDFs."""
+    mesh = of.part.mesh
+    is_mixed = any(isinstance(normal, Bump) and normal.strength < 1.0 for normal in normals_of(of.shader))
+    if not is_mixed or of.uv not in mesh.uvs:
+        return 1.0
+    areas = mesh.uv_area(of.uv), mesh.transformed(of.part.placed.matrices[0]).area()
+    squared, whole = (max(area, 1e-12) for area in areas)
+    return float(2.0 ** (round(2.0 * math.log2(squared / whole)) / 4.0))
 
 
 def _with_maps(mesh: Mesh, uv: str | None, attribute: str | None) -> Mesh:

@@ -258,6 +258,23 @@ def test_normal_maps_are_mirrored_with_their_uv_maps(blender):
     ]  # the first of lamps
 
 
+def test_normals_of_bumps_are_mixed_by_their_strength(blender):
+    code, out, result = blender.job(blender.make("soft_bumps")[0], "soft bumps")
+    assert code == 0, result
+    scene = mi.load_file(str(out / "scene.xml"))
+    si = scene.ray_intersect(mi.Ray3f(mi.Point3f([0.1, 3.1], 0.1, 3.0), mi.Vector3f(0.0, 0.0, -1.0)))
+    sample, _ = si.bsdf().sample(mi.BSDFContext(), si, 0.5, mi.Point2f(0.5))
+    half = np.add(np.array(si.to_world(sample.wo)).T, [0.0, 0.0, 1.0])
+    slopes = np.array([0.75, 0.375])
+    steep = np.stack([0.0 * slopes, -slopes, 1.0 + 0.0 * slopes], axis=-1)
+    mixed = steep / np.linalg.norm(steep, axis=-1, keepdims=True) + [0.0, 0.0, 1.0]
+    # By their scale alone the slopes were 0.375 and 0.19, not 0.33 and 0.18.
+    assert half[:, 1] / half[:, 2] == pytest.approx(mixed[:, 1] / mixed[:, 2], rel=0.03)
+    assert [note["what"] for note in result["notes"] if note["object"] == "soft"] == [
+        "slopes of bumps are scaled alike, by 0.44"
+    ]
+
+
 def test_the_alpha_of_a_colour_attribute_and_several_attributes_are_baked(blender):
     code, out, result = blender.job(blender.make("painted")[0], "painted")
     assert code == 0, result

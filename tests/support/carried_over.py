@@ -49,6 +49,11 @@ PRINCIPLED = (
         "mapped",
         "`normalmap`, `bumpmap`; mirrored UV maps and the backs of open meshes have maps of their own",
     ),
+    (
+        "Bump of images, Strength below 1",
+        "approximated",
+        "`bumpmap` of the same mean slope: steep slopes are too steep, flat ones too flat",
+    ),
     ("Normal Map of another UV map than its image's", "baked", "a `normalmap` of each mesh"),
     (
         "Displacement node, Bump Only",

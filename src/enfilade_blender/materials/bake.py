@@ -151,7 +151,7 @@ class Bakery:
         normal, image = shader.normal, shader.normal.image
         if isinstance(image, ImageValue) and self._textures.is_missing(image):
             return shader
-        if isinstance(normal, NormalMap):
+        if isinstance(normal, NormalMap) or normal.strength < 1.0:
             return replace(shader, normal=ProceduralNormal(normal.output))
         if isinstance(image, ImageValue):
             heights = Procedural(image.output, is_number=True, is_exact=True)

@@ -56,6 +56,7 @@ class Context:
     notes: Notes
     is_mirrored: bool = False  # the UV map, below normal maps
     is_back: bool = False  # the side of a surface that normals point away from
+    uv_density: float = 1.0  # texture coordinates for each scene unit
 
 
 def lobe_bsdf(lobe: Lobe, context: Context) -> Element:
@@ -286,8 +287,24 @@ def with_normal(bsdf: Element, normal: Normal, context: Context) -> Element:
     if isinstance(normal, NormalMap):
         texture = _normal_texture(normal, context)
         return plugin("bsdf", "normalmap", bsdf, normalmap=texture, use_shadowing_function=is_diffuse)
-    height = context.textures.number(normal.image)
-    return plugin("bsdf", "bumpmap", bsdf, height, scale=normal.scale, use_shadowing_function=is_diffuse)
+    height, scale = context.textures.number(normal.image), normal.scale * _kept_slope(normal, context)
+    return plugin("bsdf", "bumpmap", bsdf, height, scale=scale, use_shadowing_function=is_diffuse)
+
+
+def _kept_slope(normal: Bump, context: Context) -> float:
+    """Share of the slopes of bumps that their strength leaves, on average over the image."""
+    image, strength = normal.image, normal.strength
+    if strength >= ALMOST or not isinstance(image, ImageValue | Texture):
+        return strength
+    heights = context.textures.numbers(image)[..., 0] * normal.scale * context.uv_density
+    heights = heights * abs(np.linalg.det(np.array(image.matrix)[:2, :2])) ** 0.5
+    across, down = np.diff(heights, axis=1)[1:], np.diff(heights, axis=0)[:, 1:]  # for each texel
+    share = mapping.mixed_slope(np.hypot(across * heights.shape[1], down * heights.shape[0]), strength)
+    if share < 0.95 * strength:
+        what, effect = f"slopes of bumps are scaled alike, by {share:.2g}", "steep ones are too steep"
+        node = normal.output.node.name
+        context.notes.add("approximated", context.owner, node, what, effect + ", and flat ones too flat")
+    return share
 
 
 def _is_void(value: Value, context: Context) -> bool:

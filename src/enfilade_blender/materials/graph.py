@@ -75,7 +75,7 @@ class Graph:
             height, scale = (self.value(node.inputs[name], found.groups) for name in ("Height", "Scale"))
             if isinstance(height, Constant):
                 return shader  # moved as a whole, if at all
-            bumps = Bump(_exact(height), scale.number) if isinstance(scale, Constant) else None
+            bumps = Bump(_exact(height), scale.number, found) if isinstance(scale, Constant) else None
             effect = "the surface has its normals alone"
         if bumps is None or any(normal is not None for normal in normals_of(shader)):
             self._notes.add(
@@ -173,11 +173,12 @@ class Graph:
         if node.type == "BUMP" and not node.inputs["Normal"].is_linked:
             height = _exact(self.value(node.inputs["Height"], inner))
             strength, distance = (self.value(node.inputs[name], inner) for name in ("Strength", "Distance"))
-            if isinstance(height, Constant):
+            if isinstance(height, Constant) or strength == ZERO:
                 return None
             is_plain = isinstance(height, ImageValue) or _is_of_uv(height)
             if is_plain and isinstance(strength, Constant) and isinstance(distance, Constant):
-                return Bump(height, strength.number * distance.number * (-1.0 if node.invert else 1.0))
+                scale = distance.number * (-1.0 if node.invert else 1.0)
+                return Bump(height, scale, found, strength.number)
         return ProceduralNormal(found)
 
     def _constant(self, socket: Any) -> Constant:

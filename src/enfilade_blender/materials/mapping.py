@@ -83,6 +83,15 @@ def _f82(reflectance: float, tint: float, cosine: np.ndarray) -> np.ndarray:
     return np.clip(schlick - lowered * cosine * (1.0 - cosine) ** 6, 0.0, 1.0)
 
 
+def mixed_slope(slopes: np.ndarray, strength: float) -> float:
+    """Share of the mean of slopes that remains where normals are mixed with those of the surface.
+
+    Of a slope s and a strength k remains k s / (k + (1 - k) sqrt(1 + s^2)).
+    """
+    mixed = slopes / (strength + (1.0 - strength) * np.sqrt(1.0 + slopes**2))
+    return strength * float(mixed.sum() / max(slopes.sum(), 1e-12))
+
+
 def uv_matrix(
     kind: str, location: tuple[float, ...], rotation: tuple[float, ...], scale: tuple[float, ...]
 ) -> Matrix3:

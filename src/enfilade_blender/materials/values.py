@@ -149,10 +149,15 @@ class NormalMap:
 
 @dataclass(frozen=True)
 class Bump:
-    """Heights of an image, scene units for each unit of the image."""
+    """Heights of an image, scene units for each unit of the image; `output` of a node.
+
+    The normals are mixed with the surface's, by a share `strength` of them.
+    """
 
     image: Value
     scale: float
+    output: Output
+    strength: float = 1.0
 
 
 @dataclass(frozen=True)

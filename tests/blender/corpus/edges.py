@@ -164,6 +164,18 @@ def mirrored_normals(_folder):
         loop.vector = 1.0 - shown.vector[1], shown.vector[0]
 
 
+def soft_bumps(_folder):
+    """Mirrors of a slope of 0.75, one of them twice as large: their normals are mixed with the surface's."""
+    new_file()
+    slope = image(
+        "slope", lambda _, y: np.repeat(np.floor(y * 17)[..., None] / 17, 3, -1), 17, space="Non-Color"
+    )
+    material, tree, bsdf = shader("soft", "BsdfAnisotropic", Roughness=0.0)
+    fill(tree, bsdf, {"Normal": node_of(tree, "Bump", Strength=0.5, Distance=0.75, Height=slope)})
+    plane("small", (0.0, 0.0, 0.0), 1.0, material)
+    plane("large", (3.0, 0.0, 0.0), 2.0, material)
+
+
 def tilted(_folder):
     """A white plane of tilted normals, in even light."""
     new_file()
