@@ -34,6 +34,14 @@ def refused(file, words, **limits):
     assert str(file.parent) in str(error.value)
 
 
+def test_a_shape_group_inside_an_instance_is_refused(scene):
+    group = '<shape type="shapegroup"><shape type="cube"/></shape>'
+    file = scene(f'<shape type="instance">{group}</shape><emitter type="constant"/>')
+    refused(file, r"holds its shape group: move it to the top of the scene and refer to it by <ref id=")
+    named = group.replace(">", ' id="group">', 1)
+    check_scene(scene(f'{named}<shape type="instance"><ref id="group"/></shape>'), LimitSettings())
+
+
 @pytest.mark.parametrize("name", ["room", "atrium"])
 def test_the_generated_scenes_pass(name, tmp_path):
     file = write_scene(name, tmp_path, preset="small").scene

@@ -214,6 +214,20 @@ def test_expanded_instances_are_as_mitsuba_shows_them(with_instances):
     np.testing.assert_allclose(colour[:, is_bowl], expected.T, atol=0.02)
 
 
+SHARED = f"""<scene version="3.0.0"><shape type="cube" id="part"/><emitter type="constant"/>
+<shape type="shapegroup" id="first"><ref id="part"/></shape>
+<shape type="shapegroup" id="second"><ref id="part"/></shape>
+{instance("left", "first", -4, 0)}{instance("right", "second", 4, 0)}</scene>"""
+
+
+def test_instances_of_a_mesh_that_several_groups_share_are_not_lost(tmp_path):
+    file = tmp_path / "shared.xml"
+    file.write_text(SHARED)
+    merged = merge_meshes(load_scene(file))
+    rays = mi.Ray3f(mi.Point3f([-4.0, 0.0, 4.0], 0.1, 5.0), mi.Vector3f(0.0, 0.0, -1.0))
+    assert np.array(merged.scene.ray_intersect(rays).is_valid()).all()
+
+
 def test_textures_of_a_shape_stay_its_own(tmp_path):
     tinted = """<shape type="cube" id="{}"><texture type="checkerboard" name="vertex_tint"/>
 <ref id="red"/></shape>"""

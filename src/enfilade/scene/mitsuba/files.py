@@ -49,6 +49,8 @@ def check_scene(scene: Path, limits: LimitSettings) -> None:
                 where = mi.parser.file_location(state, node)
                 raise SceneError(f"{where}: {name!r} is not one of Mitsuba's plugins for scene files")
             _check_numbers(state, node)
+            if name == "instance":
+                _check_instance(state, node)
         for file in _files(state, resolver):
             if not file.is_file():
                 raise SceneError(f"{scene} uses {file}, which is missing or not a regular file")
@@ -182,6 +184,17 @@ def _check_numbers(state: Any, node: Any) -> None:
                 f"{mi.parser.file_location(state, node)}: {name!r} of {owner!r} has a number that is NaN or "
                 "infinite; correct it in the scene file"
             )
+
+
+def _check_instance(state: Any, node: Any) -> None:
+    """Refuse an instance that holds its shape group: Mitsuba's error does not tell the cause."""
+    nested = [node.props[name] for name in node.props.keys()]  # noqa: SIM118  (not a dictionary)
+    nodes = [state.nodes[one.index()] for one in nested if isinstance(one, mi.Properties.ResolvedReference)]
+    if any(one.props.plugin_name() == "shapegroup" for one in nodes):
+        raise SceneError(
+            f"{mi.parser.file_location(state, node)}: an instance holds its shape group: move it to the top "
+            'of the scene and refer to it by <ref id="..."/>'
+        )
 
 
 def _files(state: Any, resolver: Any) -> Iterator[Path]:

@@ -143,7 +143,9 @@ def _expanded(
     for name in sorted(groups, key=triangles.__getitem__):
         total = triangles[name] * len(instances[name])
         is_worthwhile = remaining > FEW_INSTANCES and total <= left
-        if is_worthwhile and all(_is_mergeable(shape) for shape in groups[name][1]):
+        group, members = groups[name]
+        is_complete = group.primitive_count() == triangles[name]  # a shape of two groups is found in one
+        if is_worthwhile and is_complete and all(_is_mergeable(shape) for shape in members):
             left, remaining = left - total, remaining - len(instances[name])
             kept.remove(name)
 
