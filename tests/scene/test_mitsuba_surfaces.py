@@ -99,6 +99,11 @@ def test_the_sky_is_no_shape(swatches):
         assert np.isfinite(values).all()
 
 
+LEAF_CARD = f'<bsdf type="blendbsdf">{HOLES.format("weight", "nearest")}<bsdf type="null"/>{DIFFUSE}</bsdf>'
+DIRTY_PANE = f"""<bsdf type="blendbsdf"><float name="weight" value="0.1"/>
+<bsdf type="thindielectric"/>{DIFFUSE}</bsdf>"""
+
+
 @pytest.fixture(scope="module")
 def screens(tmp_path_factory):
     """Masks before a wall and before the sky, one of them an instance, one behind another."""
@@ -115,6 +120,8 @@ def screens(tmp_path_factory):
         placed("rectangle", "thin", (-1.2, 0, 1), veil(0.2)),
         placed("rectangle", "thin behind", (-1.2, 0, 0.5), veil(0.3)),
         placed("rectangle", "above the wall", (0, 4, 1), veil(0.1)),
+        placed("rectangle", "leaf card", (2.2, 0, 1), LEAF_CARD),
+        placed("rectangle", "dirty pane", (-2.2, 0, 1), DIRTY_PANE),
         group,
     )
     renderer = opened(file)
@@ -130,7 +137,10 @@ def screens(tmp_path_factory):
         ((-1.2, 0, 1), "wall", 13.0),  # through two
         ((1.2, 0, 1), "wall", 13.0),  # through an instance
         ((0, 4, 1), None, 0.0),
-        ((2.2, 0, -1), "wall", 13.0),
+        ((2.0, 0, 1), "leaf card", 11.0),
+        ((2.4, 0, 1), "wall", 13.0),
+        ((-2.2, 0, 1), "dirty pane", 11.0),
+        ((2.2, 1.5, -1), "wall", 13.0),
     ],
 )
 def test_masked_out_surfaces_are_looked_through(screens, point, seen, depth):

@@ -111,7 +111,10 @@ def test_light_that_passes_null_interactions_keeps_its_energy(tmp_path):
         for layer in range(4)
     )
     names = "diffuse", "roughplastic", "thindielectric", "one-sided, from behind", "glowing air"
-    balls = {name: MATERIALS[name] for name in names}
+    card = (
+        f'<bsdf type="blendbsdf"><float name="weight" value="0.3"/><bsdf type="null"/>{MATERIALS["diffuse"]}'
+    )
+    balls = {name: MATERIALS[name] for name in names} | {"leaf card": f"{card}</bsdf>"}
     renderer = opened_scene(tmp_path, balls, sky + sun + layers, "volpath")
     camera = front_camera()
     ours, reference = shaded(renderer, EMPTY, camera, 256), traced(renderer, camera, 256)

@@ -14,8 +14,6 @@ from enfilade.records import SurfaceClass
 from enfilade.scene.mitsuba.integrators import has_media
 from enfilade.scene.mitsuba.merge import MergedScene
 
-NULL_BSDFS = ("MaskBSDF", "Null")  # classes with a null lobe; thin glass has one, too, but is visible
-
 LAMP = "lamp"  # id of the `null` BSDF of emitters that the camera does not see, as in Blender's Cycles
 
 
@@ -47,7 +45,7 @@ class Shapes:
         self._index = lanes(np.concatenate([*merged.sources, [0]]).astype(np.uint32))  # two lanes at least
         self._first, self._last = lanes(first), lanes(np.maximum(count, 1) - np.uint32(1))
         self._bsdfs = mi.BSDFPtr([shape.bsdf() for shape in shapes])
-        self._is_null = bsdf_table(scene, lambda bsdf: bsdf.class_name() in NULL_BSDFS)
+        self._is_null = bsdf_table(scene, is_looked_through)
         lamps = np.zeros(max(registry) + 1, bool)
         is_clear = not has_media(scene)
         lamps[registry] = [is_clear and is_lamp(shape) for shape in shapes]
@@ -95,6 +93,14 @@ def is_lamp(shape: Any) -> bool:
     """Whether a shape gives light but is no surface: an emitter whose BSDF is :data:`LAMP`."""
     bsdf = shape.bsdf()
     return bool(shape.is_emitter() and bsdf.class_name() == "Null" and bsdf.id() == LAMP)
+
+
+def is_looked_through(bsdf: Any) -> bool:
+    """Whether a BSDF has null interactions: masks, and blends with a null lobe; thin glass is visible."""
+    if not mi.has_flag(bsdf.flags(), mi.BSDFFlags.Null):
+        return False
+    nested = {node.class_name() for node in mi.traverse(bsdf).hierarchy}
+    return bsdf.class_name() == "MaskBSDF" or "ThinDielectric" not in nested
 
 
 def bsdf_table(scene: Any, value: Callable[[Any], Any], kind: Any = Bool) -> Any:
