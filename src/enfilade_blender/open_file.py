@@ -15,14 +15,12 @@ from enfilade_blender.notes import Notes
 from enfilade_blender.records import Selection
 
 IMPORTERS: dict[str, Callable[..., Any]] = {
-    ".glb": lambda file: bpy.ops.import_scene.gltf(filepath=file, import_pack_images=False),
-    ".gltf": lambda file: bpy.ops.import_scene.gltf(filepath=file, import_pack_images=False),
+    **dict.fromkeys(
+        (".glb", ".gltf"), lambda file: bpy.ops.import_scene.gltf(filepath=file, import_pack_images=False)
+    ),
     ".fbx": lambda file: bpy.ops.import_scene.fbx(filepath=file),
     ".obj": lambda file: bpy.ops.wm.obj_import(filepath=file),
-    ".usd": lambda file: bpy.ops.wm.usd_import(filepath=file),
-    ".usda": lambda file: bpy.ops.wm.usd_import(filepath=file),
-    ".usdc": lambda file: bpy.ops.wm.usd_import(filepath=file),
-    ".usdz": lambda file: bpy.ops.wm.usd_import(filepath=file),
+    **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), lambda file: bpy.ops.wm.usd_import(filepath=file)),
 }
 ALPHA_OF_FILES = {  # modes by the endings of files
     ".exr": "PREMUL",

@@ -70,13 +70,12 @@ def sun_disc(sun: Sun, width: int) -> F32:
     row = math.acos(float(np.clip(toward[2], -1.0, 1.0))) / math.pi * height
     margin = half / math.pi * height + 2.0
     rows = np.arange(max(int(row - margin), 0), min(int(row + margin) + 1, height))
-    v = (rows[:, None] + (np.arange(fine) + 0.5) / fine) / height * math.pi
-    u = (np.arange(width * fine) + 0.5) / (width * fine) * 2.0 * math.pi
-    polar, turn = v.reshape(-1)[:, None], u[None, :]
-    cosine = np.sin(polar) * (np.sin(turn) * toward[0] + np.cos(turn) * toward[1]) + np.cos(polar) * toward[2]
+    v = ((rows[:, None] + (np.arange(fine) + 0.5) / fine) / height).reshape(-1)
+    cosine = _cosine(v, (np.arange(width * fine) + 0.5) / (width * fine), toward)
     inside = (cosine > math.cos(half)).reshape(len(rows), fine, width, fine).mean(axis=(1, 3))
     solid_angle = 2.0 * (math.pi / height) ** 2 * np.sin((rows + 0.5) / height * math.pi) / 2.0
-    weight = float((inside * solid_angle[:, None] * _pixel_cosine(rows, width, toward)).sum())
+    of_pixels = _cosine((rows + 0.5) / height, (np.arange(width) + 0.5) / width, toward)
+    weight = float((inside * solid_angle[:, None] * np.maximum(of_pixels, 0.0)).sum())
     image = np.zeros((height, width, 3), np.float32)
     image[rows] = inside[..., None] * np.array(sun.irradiance) / max(weight, 1e-12)
     return image
@@ -87,12 +86,11 @@ def _narrowest(width: int) -> float:
     return 4.0 * math.pi / width
 
 
-def _pixel_cosine(rows: np.ndarray, width: int, toward: np.ndarray) -> np.ndarray:
-    polar = (rows[:, None] + 0.5) / (width // 2) * math.pi
-    turn = (np.arange(width)[None, :] + 0.5) / width * 2.0 * math.pi
-    cosine = np.sin(polar) * (np.sin(turn) * toward[0] + np.cos(turn) * toward[1]) + np.cos(polar) * toward[2]
-    positive: np.ndarray = np.maximum(cosine, 0.0)
-    return positive
+def _cosine(v: np.ndarray, u: np.ndarray, toward: np.ndarray) -> np.ndarray:
+    """Cosines (V, U) between a direction and those of coordinates of the map, 0..1."""
+    polar, turn = v[:, None] * math.pi, u[None, :] * 2.0 * math.pi
+    cosine: np.ndarray = np.cos(polar) * toward[2]
+    return cosine + np.sin(polar) * (np.sin(turn) * toward[0] + np.cos(turn) * toward[1])
 
 
 def _plain(world: Any, notes: Notes) -> tuple[float, float, float] | None:

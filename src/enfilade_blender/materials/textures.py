@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeGuard
 
@@ -77,26 +78,27 @@ class Textures:
         """A colour times a number, which may pass 1."""
         if isinstance(value, Constant):
             return colour(value.colour, scale)
-        if abs(scale - 1.0) < 0.01 or not self.has_pixels(value):
+        if abs(scale - 1.0) < 0.01:
             return self._texture(value)
-        return self.rewritten(value, self.pixels(value) * scale, f"times {scale:.3g}", raw=False)
+        return self._mapped(value, lambda pixels: pixels * scale, f"times {scale:.3g}")
 
     def lightened(self, value: Value, white: float) -> tuple[float, float, float] | Element:
         """A colour below a share of white."""
         if isinstance(value, Constant):
             return colour([white + (1.0 - white) * c for c in value.colour])
-        if not self.has_pixels(value):
-            return self._texture(value)
-        image = white + (1.0 - white) * self.pixels(value)
-        return self.rewritten(value, image, f"below {white:.3g}", raw=False)
+        return self._mapped(value, lambda pixels: white + (1.0 - white) * pixels, f"below {white:.3g}")
 
     def root(self, value: Value) -> Constant | Element:
         """The square root of a colour."""
         if isinstance(value, Constant):
             return Constant(tuple(max(c, 0.0) ** 0.5 for c in value.colour))
+        return self._mapped(value, lambda pixels: np.sqrt(np.maximum(pixels, 0.0)), "root")
+
+    def _mapped(self, value: Value, change: Callable[[F32], F32], name: str) -> Element:
+        """A texture of changed colours; the value's own where it has no pixels."""
         if not self.has_pixels(value):
             return self._texture(value)
-        return self.rewritten(value, np.sqrt(np.maximum(self.pixels(value), 0.0)), "root", raw=False)
+        return self.rewritten(value, change(self.pixels(value)), name, raw=False)
 
     def number(self, value: Value) -> float | Element:
         """A number or a texture of numbers."""

@@ -45,11 +45,6 @@ class Blender:
     is_module: bool
     note: str = ""
 
-    @property
-    def is_new_enough(self) -> bool:
-        """Whether the importer's scripts run in it."""
-        return tuple(map(int, self.version.split(".")[:2])) >= LEAST_VERSION
-
     def command(self, script: Path, job: Path) -> list[str]:
         """Command line that runs a script with a job file; files' own scripts are disabled."""
         if self.is_module:
@@ -137,8 +132,9 @@ def _asked(program: Path) -> Blender | str:
     if found is None:
         return "it has no module bpy" if is_module else "it doesn't answer --version as Blender does"
     blender = Blender(program.absolute(), f"{found[1]}.{found[2]}{found[3]}", is_module)
-    least = ".".join(map(str, LEAST_VERSION))
-    return blender if blender.is_new_enough else f"it is Blender {blender.version}, older than {least}"
+    if (int(found[1]), int(found[2])) >= LEAST_VERSION:
+        return blender
+    return f"it is Blender {blender.version}, older than {'.'.join(map(str, LEAST_VERSION))}"
 
 
 def _output(line: list[str]) -> str:

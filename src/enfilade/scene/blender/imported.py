@@ -33,11 +33,6 @@ class SourceView:
     view_transform: str
     look: str
 
-    @property
-    def is_standard(self) -> bool:
-        """Whether it is the plain sRGB curve."""
-        return (self.display, self.view_transform, self.look) == ("sRGB", "Standard", "None")
-
 
 @dataclass(frozen=True)
 class ImportedScene:

@@ -184,7 +184,7 @@ def _with_view(imported: ImportedScene, blender: Blender) -> ImportedScene:
 
 def _video(view: SourceView, blender: Blender, folder: Path) -> tuple[dict[str, str], str]:
     """Settings of the video for a view, whose files are copied; or none, and why."""
-    if view.is_standard:
+    if view == SourceView("sRGB", "Standard", "None"):
         return {}, ""
     config = blender.color_config()
     if config is None:

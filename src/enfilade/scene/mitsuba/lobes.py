@@ -321,7 +321,7 @@ def _lambert(si: Any, wo: Any, albedo: Any) -> tuple[Any, Any]:
 
 
 def _of(table: Any, si: Any, bsdf: Any) -> Any:
-    """Entries of a table of BSDFs; Bool or UInt."""
+    """Entries of a table of BSDFs, of its type."""
     return dr.gather(type(table), table, _number(bsdf), si.is_valid())
 
 
