@@ -45,7 +45,7 @@ PRINCIPLED = (
         "`area` emitter; meshes that are open, partly transparent, or around something shine on both sides",
     ),
     (
-        "Normal: Normal Map, Bump of images",
+        "Normal: Normal Map, Bump of images of Strength 1",
         "mapped",
         "`normalmap`, `bumpmap`; mirrored UV maps and the backs of open meshes have maps of their own",
     ),
@@ -99,8 +99,8 @@ INPUTS = (
     ),
     (
         "Fresnel, Layer Weight below Glossy in a Mix Shader",
-        "mapped",
-        "`plastic`, `thindielectric` or a layer",
+        "approximated",
+        "`plastic` without a tint of reflections, `thindielectric` without their roughness, or an even layer",
     ),
     ("Fresnel, Layer Weight elsewhere", "approximated", "baked as seen along the normal"),
     ("Coordinates and vectors of the camera", "approximated", "baked: the same from all directions"),
@@ -139,7 +139,8 @@ LIGHTS = (
         "mapped",
         "`rectangle` or `disk`; not seen by the camera",
     ),
-    ("Sun of angle 0, or beside another sun", "mapped", "`directional`"),
+    ("Sun of angle 0", "mapped", "`directional`"),
+    ("Sun with an angle, beside a brighter one", "approximated", "`directional`: shadows are sharp"),
     ("Sun with an angle", "mapped", "a disc in the environment map, at least two of its pixels wide"),
     (
         "Nodes of lights: emissions of constants and what is computed of them, sums, mixes, Light Falloff",
@@ -233,7 +234,7 @@ def markdown():
         (
             "Mix shader",
             "mapped",
-            "`blendbsdf`; with Transparent `mask`; with Fresnel `plastic` or `thindielectric`",
+            "`blendbsdf`; with Transparent `mask`; with Fresnel see Inputs",
         ),
         (
             "Add shader",
