@@ -421,7 +421,7 @@ def test_a_sequence_of_images_is_baked_as_in_the_first_frame(exported):
 def test_a_coat_is_even_over_a_bumpy_base(exported):
     bsdf = ET.parse(exported("left_out")[0] / "scene.xml").find("bsdf[@id='material coated']")
     kinds = [nested.get("type") for nested in bsdf.find("bsdf").findall("bsdf")]
-    assert kinds == ["normalmap", "conductor"]
+    assert kinds == ["normalmap", "roughconductor"]
 
 
 def test_triangles_without_a_place_are_left_out(exported):

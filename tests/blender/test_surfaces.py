@@ -14,6 +14,7 @@ from enfilade_blender.materials.textures import Textures
 from enfilade_blender.materials.values import Constant, Lobe, Mix, Principled
 from enfilade_blender.notes import Notes
 
+SAMPLES = 100_000
 WHITE = Constant((1.0, 1.0, 1.0))
 CLEAR = Lobe("transparent", WHITE, "clear")
 
@@ -28,15 +29,26 @@ def noted(context):
     return [note["what"] for note in context.notes.to_list()]
 
 
+def loaded(shader, context):
+    text = ET.tostring(build(shader, context).element(context), encoding="unicode")
+    return mi.load_string(text.replace(" type", ' version="3.0.0" type', 1))
+
+
 def passed(shader, context):
     """Share of light that passes a surface along its normal."""
-    element = build(shader, context).element(context)
     si = dr.zeros(mi.SurfaceInteraction3f)
     si.wi = mi.Vector3f(0.0, 0.0, 1.0)
-    bsdf = mi.load_string(
-        ET.tostring(element, encoding="unicode").replace(" type", ' version="3.0.0" type', 1)
-    )
-    return np.array(bsdf.eval_null_transmission(si)).ravel()
+    return np.array(loaded(shader, context).eval_null_transmission(si)).ravel()
+
+
+def albedo(shader, context):
+    """Share of uniform light that Mitsuba's samples reflect."""
+    u = np.random.default_rng(1).random((4, SAMPLES), np.float32)
+    cosine = mi.Float(np.sqrt(u[0]))  # directions weighted by their cosine
+    si = dr.zeros(mi.SurfaceInteraction3f, SAMPLES)
+    si.wi = mi.Vector3f(dr.sqrt(1.0 - cosine * cosine), 0.0, cosine)
+    _, weight = loaded(shader, context).sample(mi.BSDFContext(), si, mi.Float(u[1]), mi.Point2f(u[2], u[3]))
+    return float(dr.mean(weight.x)[0])
 
 
 @pytest.mark.parametrize(
@@ -85,3 +97,21 @@ def test_microfacets_of_single_scattering_have_no_gain(context, shader, name, ow
 def test_transparency_passes_its_luminance(context, colour, share, notes):
     assert passed(replace(CLEAR, colour=Constant(colour)), context) == pytest.approx(share, abs=1e-3)
     assert noted(context) == notes
+
+
+NONE, ONE = Constant((0.0,)), Constant((1.0,))
+COAT = {"Coat Weight": ONE, "Coat Roughness": Constant((0.03,))}
+MATT = {"Base Color": GREY, "Specular IOR Level": NONE}
+
+
+@pytest.mark.parametrize("base", [MATT, METAL, METAL | {"Roughness": NONE}, {"Roughness": NONE}])
+def test_coats_keep_their_energy(context, base):
+    """Mitsuba mixes the density of rough parts of a blend into samples of smooth ones."""
+    below, coated = (albedo(Principled(inputs, None, "base"), context) for inputs in (base, base | COAT))
+    reflected = 0.0918  # of an index of 1.5
+    assert coated == pytest.approx((1.0 - reflected) * below + reflected, rel=0.03)
+
+
+def test_a_mix_with_a_mirror_keeps_its_energy(context):
+    mix = Mix(Constant((0.5,)), Lobe("diffuse", GREY, "paint"), Lobe("glossy", WHITE, "mirror"), None, "mix")
+    assert albedo(mix, context) == pytest.approx(0.75, rel=0.01)

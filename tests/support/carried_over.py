@@ -66,7 +66,7 @@ PRINCIPLED = (
     (
         "Coat",
         "mapped",
-        "`blendbsdf` with a `roughconductor` of k = 0",
+        "`blendbsdf` with a `roughconductor` of k = 0; with a `conductor` over smooth metal and glass",
     ),
     ("Coat Tint, Coat Normal", "not carried", "the coat is clear and even"),
     ("Sheen", "approximated", "a rough dielectric layer"),
@@ -242,6 +242,7 @@ def markdown():
             "an `area` emitter beside the other shader; else `blendbsdf` of equal shares",
         ),
         ("Emission", "mapped", "`area` emitter"),
+        ("Smooth shaders mixed with rough ones", "mapped", "rough ones of alpha 0.001, which is not seen"),
         (
             "Beckmann, Ashikhmin-Shirley",
             "approximated",

@@ -44,6 +44,8 @@ TRANSMITTING = {
     "twosided",
 }
 DIFFUSE = {"diffuse", "plastic", "roughplastic", "blendbsdf"}  # plastics are so for the most part
+DELTA = {"conductor", "dielectric", "thindielectric", "null"}  # without rough lobes
+ROUGHENED = {"conductor", "dielectric", "plastic"}  # smooth ones that have a rough counterpart
 ALMOST = 0.995  # weights above are 1, below the rest 0
 
 
@@ -96,9 +98,8 @@ def plastic_bsdf(base: Value, roughness: Value, ior: float, context: Context) ->
     if isinstance(roughness, Constant):
         return _plastic_of(base, roughness.number, ior, context)
     low, high, weight = _two_roughnesses(roughness, context)
-    return plugin(
-        "bsdf", "blendbsdf", *[_plastic_of(base, r, ior, context) for r in (low, high)], weight=weight
-    )
+    first, second = (_plastic_of(base, r, ior, context) for r in (low, high))
+    return blended(first, second, weight)
 
 
 def _plastic_of(base: Value, roughness: float, ior: float, context: Context) -> Element:
@@ -272,7 +273,7 @@ def layered(
         return base
     reflectance = colour(tint, 1.0 / mean)
     layer = _microfacets("conductor", alpha, eta=(ior,) * 3, k=(0.0,) * 3, specular_reflectance=reflectance)
-    return plugin("bsdf", "blendbsdf", base, layer, weight=context.textures.scaled_number(weight, mean))
+    return blended(base, layer, context.textures.scaled_number(weight, mean))
 
 
 def with_normal(bsdf: Element, normal: Normal, context: Context) -> Element:
@@ -335,7 +336,22 @@ def blend(
         return first()
     if is_one(weight):
         return second()
-    return plugin("bsdf", "blendbsdf", first(), second(), weight=context.textures.number(weight))
+    return blended(first(), second(), context.textures.number(weight))
+
+
+def blended(first: Element, second: Element, weight: Element | float) -> Element:
+    """Two BSDFs by a weight; beside rough ones, smooth ones have a roughness that is not seen.
+
+    Mitsuba's ``blendbsdf`` mixes the density of rough parts into samples of smooth ones: a coat over a black
+    surface lost half of its reflections.
+    """
+    nested = [bsdf for part in (first, second) for bsdf in part.iter("bsdf")]
+    if not {bsdf.get("type") for bsdf in nested if bsdf.find("bsdf") is None} <= DELTA:
+        for bsdf in nested:
+            if bsdf.get("type") in ROUGHENED:
+                bsdf.set("type", f"rough{bsdf.get('type')}")
+                bsdf.extend(plugin("bsdf", "", distribution="ggx", alpha=SMOOTH))
+    return plugin("bsdf", "blendbsdf", first, second, weight=weight)
 
 
 def clipped(roughness: float) -> float:

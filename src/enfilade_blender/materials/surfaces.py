@@ -10,6 +10,7 @@ from enfilade_blender.materials import mapping
 from enfilade_blender.materials.bsdfs import (
     ALMOST,
     Context,
+    blended,
     is_one,
     is_zero,
     layered,
@@ -233,9 +234,8 @@ def _blended(first: Surface, second: Surface, mix: Mix, context: Context) -> Sur
         context.notes.add("approximated", context.owner, mix.name, what, effect)
     if first.bsdf is None and second.bsdf is None and first.opacity == second.opacity:
         return replace(first, emitted=_joined(emitted, mix, context))
-    parts = [_masked(part, context) for part in (first, second)]
-    weight = context.textures.number(mix.factor)
-    bsdf = plugin("bsdf", "blendbsdf", *parts, weight=weight)
+    parts = _masked(first, context), _masked(second, context)
+    bsdf = blended(*parts, context.textures.number(mix.factor))
     return Surface(bsdf, emitted=_joined(emitted, mix, context))
 
 
@@ -252,8 +252,7 @@ def _sum(add: Add, context: Context) -> Surface:
     if first.is_invisible or second.is_invisible:
         effect = "half of the light passes through the surface, and the other half meets it"
     context.notes.add("approximated", context.owner, add.name, what, effect)
-    parts = [_masked(part, context) for part in (first, second)]
-    return Surface(plugin("bsdf", "blendbsdf", *parts, weight=0.5), emitted=emitted)
+    return Surface(blended(_masked(first, context), _masked(second, context), 0.5), emitted=emitted)
 
 
 def _masked(surface: Surface, context: Context) -> Element:
