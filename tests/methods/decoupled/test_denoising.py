@@ -89,3 +89,17 @@ def test_pixels_without_irradiance_stay_black():
     found = denoised(known, where)
     assert found[where].mean() == pytest.approx(1.0, rel=0.03)
     assert found[:, :70].max() < 0.05
+
+
+@pytest.mark.parametrize(("chance", "is_extended", "error"), [(2, False, 0.08), (20, True, 0.1)])
+def test_surfaces_are_not_darker_beside_pixels_without_light(chance, is_extended, error):
+    """As a ceiling beside the metal rim of a lamp."""
+    row, column = np.indices(WHERE.shape)
+    distance = np.hypot(row - 60, column - 80)
+    where = (distance < 14) | (distance > 18)
+    light = noisy(chance)
+    light.color[~where] = 0.0
+    light.variance[~where] = 0.0
+    found = denoised(light, where, is_extended=is_extended)
+    is_beside = (distance > 18) & (distance < 20)
+    assert found[is_beside].mean() == pytest.approx(light.color[is_beside].mean(), rel=error)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import drjit as dr
 import numpy as np
 import scipy.ndimage
@@ -14,6 +16,7 @@ from enfilade.methods.denoise import denoise
 from enfilade.records import F32, Geometry, Mask, Shading
 
 MARGIN = 8  # pixels around those with light, which are denoised with them
+JITTER = 3  # pixels: light beyond the sampled ones has noise as theirs, and no streaks
 NOISE_SHARE = 0.25  # of the variance of irradiance: low-discrepancy samples have less noise than it tells
 OUTLIER = 64.0  # times the denoised irradiance: brighter estimates are limited where the mean is kept
 LEVELS = 5  # of the wavelet that smooths the correction: 32 pixels to each side
@@ -65,6 +68,7 @@ def denoise_light(
     quality: str,
     outlier: float,
     is_excess_kept: bool = False,
+    is_extended: bool = False,
 ) -> F32:
     """Denoise light with normals as guides, and keep its mean along surfaces.
 
@@ -91,16 +95,19 @@ def denoise_light(
         Limit of the input of the correction, in units of the denoised value.
     is_excess_kept
         Whether light beyond that limit is distributed over the whole image, in proportion to the light there.
+    is_extended
+        Whether the guides of sampled pixels extend to others, so that the denoiser sees no edges there.
 
     Returns
     -------
     (H, W, 3) float32
     """
     # Denoise, light below zero apart.
-    above = _denoised(np.maximum(light.color, np.float32(0)), geometry, where, quality)
+    positive = np.maximum(light.color, np.float32(0))
+    above = _denoised(positive, geometry, where, quality, is_extended=is_extended)
     below: F32 | np.float32 = np.float32(0)
     if light.color.min() < 0.0:
-        below = _denoised(np.maximum(-light.color, np.float32(0)), geometry, where, quality)
+        below = _denoised(positive - light.color, geometry, where, quality, is_extended=is_extended)
 
     # Smooth the difference, and the luminance.
     clean, lowest = above - below, -np.float32(outlier) * below
@@ -130,15 +137,37 @@ def denoise_light(
     return bounded
 
 
-def _denoised(color: F32, geometry: Geometry, where: Mask, quality: str) -> F32:
-    """Denoise the part of an image that has light; the guides are an albedo of one, and the normals."""
+def _denoised(color: F32, geometry: Geometry, where: Mask, quality: str, *, is_extended: bool) -> F32:
+    """Denoise the part of an image that has light; the guides are an albedo of one, and the normals.
+
+    Pixels that were not sampled have light like the nearest ones that were: black would darken their edges.
+    """
     clean = np.zeros_like(color)
     for part in _bounding_box(np.any(color, axis=2)):
         is_sampled = where[part][..., None]
-        white = np.repeat(is_sampled, 3, axis=2).astype(np.float32)
-        normal = np.where(is_sampled, geometry.normal[part], np.float32(0))
-        clean[part] = denoise(color[part], white, normal, quality=quality)
+        light = np.where(is_sampled, color[part], color[part][_nearest(where[part], JITTER)])
+        is_guided = is_extended | is_sampled
+        normal = np.where(is_guided, geometry.normal[part][_nearest(where[part])], np.float32(0))
+        white = np.broadcast_to(is_guided, normal.shape).astype(np.float32)
+        clean[part] = denoise(light, white, normal, quality=quality)
     return clean
+
+
+def _nearest(where: Mask, jitter: int = 0) -> tuple[Any, ...]:
+    """Rows and columns of the pixel of a mask that is nearest to each, or to one up to so many pixels away.
+
+    Each pixel's own where the mask is empty.
+    """
+    places = tuple(np.indices(where.shape))
+    if not where.any():
+        return places
+    rows, columns = scipy.ndimage.distance_transform_edt(~where, return_distances=False, return_indices=True)
+    random = np.random.default_rng(0)
+    near = tuple(
+        np.clip(of + random.integers(-jitter, jitter + 1, of.shape), 0, size - 1)
+        for of, size in zip(places, where.shape, strict=True)
+    )
+    return rows[near], columns[near]
 
 
 def _bounding_box(mask: Mask) -> list[tuple[slice, slice]]:

@@ -44,7 +44,7 @@ class Decoupled(Method):
     """Irradiance cached at keyframes; visibility, texture, edges and specular lobes in every frame."""
 
     name = "decoupled"
-    revision = 39
+    revision = 40
     needs_lobes = True
     settings = (TraceSettings, ViewingSettings, KeyframeSettings, DecoupledSettings)
     passes = (

@@ -93,7 +93,7 @@ def upload_aovs(geometry: Geometry, aovs: Sequence[SpecularAov], count: int, whe
 
 def _denoised(geometry: Geometry, aov: Shading, where: Mask) -> SpecularAov:
     """Denoise an AOV, guided by the surfaces that are seen in it."""
-    color = denoise_light(geometry, aov, where, quality=DENOISER, outlier=OUTLIER)
+    color = denoise_light(geometry, aov, where, quality=DENOISER, outlier=OUTLIER, is_extended=True)
     # Average the deviation over the sampled pixels.
     deviation, share = (
         scipy.ndimage.uniform_filter(of, DENOISED_SUPPORT)
