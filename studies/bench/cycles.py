@@ -1,8 +1,8 @@
 """``python -m studies.bench.cycles shot.blend``: Cycles and Open Image Denoise against enfilade.
 
 Both render one file. Each is measured against its own converged reference, since materials and lights are
-not the same to the last percent. Cycles keeps its data from frame to frame and has the file's own settings,
-but for samples and denoiser. CPU time is that of whole processes: start, loading, all frames; a run of
+not the same to the last percent. Cycles keeps its data from frame to frame. It has the file's own settings,
+but for samples and denoiser, and without adaptive sampling, motion blur and compositing. CPU time is that of whole processes: start, loading, all frames; a run of
 enfilade that compiled kernels is made again. Let nothing else run at the same time.
 """
 
@@ -76,9 +76,11 @@ class CyclesBench:
             "seed": seed, "denoise": not is_reference, "unbiased": False,
         }  # fmt: skip
 
+        blender = find_blender(self.program)
+
         def work() -> None:
             with watch(quiet=False) as monitor:
-                run_job(find_blender(self.program), job, LIMITS, monitor)
+                run_job(blender, job, LIMITS, monitor)
 
         return self._once(out, work)
 
