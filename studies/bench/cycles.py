@@ -2,8 +2,9 @@
 
 Both render one file. Each is measured against its own converged reference, since materials and lights are
 not the same to the last percent. Cycles keeps its data from frame to frame. It has the file's own settings,
-but for samples and denoiser, and without adaptive sampling, motion blur and compositing. CPU time is that of whole processes: start, loading, all frames; a run of
-enfilade that compiled kernels is made again. Let nothing else run at the same time.
+but for samples and denoiser, and without adaptive sampling, motion blur and compositing. CPU time is that of
+whole processes: start, loading, all frames; a run of enfilade that compiled kernels is made again. Let
+nothing else run at the same time.
 """
 
 from __future__ import annotations
