@@ -16,7 +16,7 @@ from enfilade.methods.denoise import denoise
 from enfilade.records import F32, Geometry, Mask, Shading
 
 MARGIN = 8  # pixels around those with light, which are denoised with them
-JITTER = 3  # pixels: light beyond the sampled ones has noise as theirs, and no streaks
+JITTER = 1  # pixels: light beyond the sampled ones has noise as theirs, and fewer streaks
 NOISE_SHARE = 0.25  # of the variance of irradiance: low-discrepancy samples have less noise than it tells
 OUTLIER = 64.0  # times the denoised irradiance: brighter estimates are limited where the mean is kept
 LEVELS = 5  # of the wavelet that smooths the correction: 32 pixels to each side
