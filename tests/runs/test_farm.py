@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
@@ -186,6 +187,31 @@ def test_limits_of_slurm(begun, slurm, monkeypatch):
         submit(begun, "slurm", 2, {"slurm_queue": "cpu"}, print)
     with pytest.raises(SettingsError, match="timeout_min"):
         submit(begun, "slurm", 2, {"timeout_min": "1h"}, print)
+
+
+def test_a_command_that_has_just_been_started_ends_with_its_job(monkeypatch):
+    class Popen(subprocess.Popen):
+        """Out of time as soon as the process exists."""
+
+        def __init__(self, *args, **options):
+            super().__init__(*args, **options)
+            started.append(self)
+            os.kill(os.getpid(), signal.SIGUSR2)
+            time.sleep(0.2)  # for the main thread to run the handler
+
+    def out_of_time(*_):
+        raise SystemExit
+
+    started: list[subprocess.Popen] = []
+    monkeypatch.setattr(farm.subprocess, "Popen", Popen)
+    before = signal.signal(signal.SIGUSR2, out_of_time)
+    try:
+        with pytest.raises(SystemExit):
+            farm.Command(["sleep", "3600"])()
+        assert started[0].returncode == -signal.SIGKILL
+    finally:
+        signal.signal(signal.SIGUSR2, before)
+        started[0].kill()
 
 
 def test_a_command_that_is_out_of_time_is_queued_again(begun, slurm, tmp_path, monkeypatch):

@@ -11,8 +11,10 @@ import re
 import shutil
 import subprocess
 import sys
+import threading
 from collections import Counter, deque
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -101,16 +103,37 @@ class Command:
             It failed.
         """
         last: deque[str] = deque(maxlen=TAIL)
-        with subprocess.Popen(self.line, stderr=subprocess.PIPE, text=True, errors="replace") as process:  # noqa: S603
+        started: list[subprocess.Popen[str]] = []
+
+        # submitit ends the job by an exception from a signal handler. Handlers run in the main thread: in
+        # another one the process is started and noted, or neither, and none is started after the end.
+        lock, ended = threading.Lock(), threading.Event()
+
+        def start() -> None:
+            with lock:
+                if not ended.is_set():
+                    started.append(
+                        subprocess.Popen(self.line, stderr=subprocess.PIPE, text=True, errors="replace")  # noqa: S603
+                    )
+
+        with ThreadPoolExecutor(1) as starter:
             try:
-                for text in process.stderr or ():
+                starter.submit(start).result()
+                for text in started[0].stderr or ():
                     sys.stderr.write(text)
                     last.append(text)
-            except BaseException:  # submitit ends the job by an exception from a signal handler
-                process.kill()
+            except BaseException:
+                with lock:
+                    ended.set()
+                for process in started:
+                    process.kill()
                 raise
-        if process.returncode:
-            raise EnfiladeError("".join(last).strip() or f"it ended with exit code {process.returncode}")
+            finally:
+                for process in started:
+                    with process:  # wait for it, and close its pipe
+                        pass
+        if code := started[0].returncode:
+            raise EnfiladeError("".join(last).strip() or f"it ended with exit code {code}")
 
     def checkpoint(self) -> Any:
         """The same again: finished tasks of the run are not done again."""
@@ -206,12 +229,7 @@ def _executor(submitit: Any, folder: Path, cluster: str, options: dict[str, Any]
             folder=folder / "slurm", cluster=cluster, slurm_max_num_timeout=timeouts
         )
         executor.update_parameters(**given)
-    except (
-        NameError,
-        TypeError,
-        ValueError,
-        AssertionError,
-    ) as error:  # a parameter unknown, or of a wrong type
+    except (AssertionError, NameError, TypeError, ValueError) as error:  # unknown, or of a wrong type
         raise SettingsError(f"submitit refuses --slurm {' '.join(options)}: {error}") from error
     except RuntimeError as error:
         raise EnfiladeError(f"submitit: {error}") from error
