@@ -16,7 +16,7 @@ from enfilade.methods.denoise import denoise
 from enfilade.records import F32, Geometry, Mask, Shading
 
 MARGIN = 8  # pixels around those with light, which are denoised with them
-JITTER = 1  # pixels: light beyond the sampled ones has noise as theirs, and fewer streaks
+EXTENSION, JITTER = 2.5, 1  # pixels: of guides beyond the sampled ones, and of the light there
 NOISE_SHARE = 0.25  # of the variance of irradiance: low-discrepancy samples have less noise than it tells
 OUTLIER = 64.0  # times the denoised irradiance: brighter estimates are limited where the mean is kept
 LEVELS = 5  # of the wavelet that smooths the correction: 32 pixels to each side
@@ -96,7 +96,7 @@ def denoise_light(
     is_excess_kept
         Whether light beyond that limit is distributed over the whole image, in proportion to the light there.
     is_extended
-        Whether the guides of sampled pixels extend to others, so that the denoiser sees no edges there.
+        Whether the guides of sampled pixels extend beyond them, so that the denoiser sees no edges there.
 
     Returns
     -------
@@ -141,33 +141,29 @@ def _denoised(color: F32, geometry: Geometry, where: Mask, quality: str, *, is_e
     """Denoise the part of an image that has light; the guides are an albedo of one, and the normals.
 
     Pixels that were not sampled have light like the nearest ones that were: black would darken their edges.
+    With `is_extended` those beside sampled ones have their normals, too.
     """
     clean = np.zeros_like(color)
     for part in _bounding_box(np.any(color, axis=2)):
-        is_sampled = where[part][..., None]
-        light = np.where(is_sampled, color[part], color[part][_nearest(where[part], JITTER)])
-        is_guided = is_extended | is_sampled
-        normal = np.where(is_guided, geometry.normal[part][_nearest(where[part])], np.float32(0))
+        distance, nearest = scipy.ndimage.distance_transform_edt(~where[part], return_indices=True)
+        around = _jittered(distance.shape)
+        light = np.where(
+            where[part][..., None], color[part], color[part][tuple(of[around] for of in nearest)]
+        )
+        is_guided = (distance <= (EXTENSION if is_extended else 0.0))[..., None]
+        normal = np.where(is_guided, geometry.normal[part][tuple(nearest)], np.float32(0))
         white = np.broadcast_to(is_guided, normal.shape).astype(np.float32)
         clean[part] = denoise(light, white, normal, quality=quality)
     return clean
 
 
-def _nearest(where: Mask, jitter: int = 0) -> tuple[Any, ...]:
-    """Rows and columns of the pixel of a mask that is nearest to each, or to one up to so many pixels away.
-
-    Each pixel's own where the mask is empty.
-    """
-    places = tuple(np.indices(where.shape))
-    if not where.any():
-        return places
-    rows, columns = scipy.ndimage.distance_transform_edt(~where, return_distances=False, return_indices=True)
-    random = np.random.default_rng(0)
-    near = tuple(
-        np.clip(of + random.integers(-jitter, jitter + 1, of.shape), 0, size - 1)
-        for of, size in zip(places, where.shape, strict=True)
+def _jittered(shape: tuple[int, ...]) -> tuple[Any, ...]:
+    """Rows and columns of a pixel near each: copies of single pixels would be streaks."""
+    random, jitter = np.random.default_rng(0), range(-JITTER, JITTER + 1)
+    return tuple(
+        np.clip(of + random.choice(jitter, shape), 0, size - 1)
+        for of, size in zip(np.indices(shape), shape, strict=True)
     )
-    return rows[near], columns[near]
 
 
 def _bounding_box(mask: Mask) -> list[tuple[slice, slice]]:
