@@ -181,7 +181,7 @@ def glass_bsdf(
 
 
 def _glass_gain(ior: float, number: int, alpha: float, *, is_multiple: bool) -> float:
-    return ggx.glass_gains(round(alpha, 3) * is_multiple, round(ior, 3))[number]
+    return ggx.glass_gains(round(alpha, 3), round(ior, 3))[number] if is_multiple else 1.0
 
 
 def conductor_bsdf(
@@ -202,7 +202,7 @@ def conductor_bsdf(
             optics, tint = {"eta": _unbounded(eta), "k": _unbounded(k)}, np.ones(3)
 
         def gain(alpha: float) -> np.ndarray:
-            return np.array([ggx.metal_scale(float(c), alpha * is_multiple) for c in r])
+            return np.array([ggx.metal_scale(float(c), alpha) if is_multiple else 1.0 for c in r])
 
         name = "metal" + "".join(f" {c:.3g}" for c in r)
         optics["specular_reflectance"] = _gained(_unbounded(tint), gain, alpha, roughness, name, context)
