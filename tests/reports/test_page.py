@@ -172,12 +172,12 @@ def test_a_run_without_its_video_is_not_finished(tmp_path):
     job = json.loads((folder / "job.json").read_text())
     job["settings"]["video"]["codec"] = "ffv1"
     write_json(folder / "job.json", job)
-    assert "state-unfinished" in written(folder, tmp_path)[1]
+    assert "state state-unfinished" in written(folder, tmp_path)[1]
     job["settings"]["video"]["codec"] = "h264"
     write_json(folder / "job.json", job)
-    assert "state-finished" in written(folder, tmp_path)[1]
+    assert "state state-finished" in written(folder, tmp_path)[1]
     (folder / "video.mp4").unlink()
-    assert "state-unfinished" in written(folder, tmp_path)[1]
+    assert "state state-unfinished" in written(folder, tmp_path)[1]
 
 
 def test_a_running_run_is_shown_as_far_as_it_is_finished(tmp_path):
@@ -186,7 +186,7 @@ def test_a_running_run_is_shown_as_far_as_it_is_finished(tmp_path):
         ledger.write('{"pass": "frames", "fra')  # being written just now
     before = {file: file.read_bytes() for file in folder.rglob("*.[!l]*")}
     notes, text, data = written(folder, tmp_path)
-    assert "state-unfinished" in text
+    assert "state state-unfinished" in text
     assert "4 of 10 frames, last result" in text
     assert "rays per pixel so far" in text
     lock = Lock(folder)
