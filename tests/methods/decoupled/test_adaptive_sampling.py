@@ -154,6 +154,28 @@ def test_edges_are_not_refined_beyond_the_largest_number_of_rays():
     assert not rays.refine(None, everywhere, everywhere, everywhere, 4).any()
 
 
+@pytest.mark.parametrize(("most", "reach"), [(2, 1), (16, 1), (17, 2), (64, 3), (128, 4)])
+def test_refinement_reads_no_pixel_beyond_its_reach(most, reach):
+    # Everything is uncertain, so that rays spread as far as they can; brighter pixels lie beyond.
+    sampling = AdaptiveSampling(most, tolerance=1e-4, exposure_ev=0.0)
+    assert sampling.reach == reach
+    edges = np.zeros((H, W), bool)
+    edges[H // 2, W // 2] = True
+    read = []
+
+    class Recorded(Noisy):
+        def luminance(self, where):
+            read.append(np.argwhere(everywhere)[where])
+            return super().luminance(where)
+
+    everywhere = np.ones((H, W), bool)
+    estimate = Recorded(everywhere, np.zeros((H, W), int), everywhere)
+    refined = sampling.refine(estimate, everywhere, edges, everywhere, 0)
+    distances = np.abs(np.concatenate(read) - (H // 2, W // 2)).max(axis=1)
+    assert distances.max() == reach
+    np.testing.assert_array_equal(refined, dilated(edges, reach - 1))
+
+
 def test_edges_matter_where_the_display_shows_them():
     color = np.zeros((H, W, 3), np.float32)
     color[:, 15:] = 0.05

@@ -58,6 +58,15 @@ class AdaptiveSampling:
         tolerance = times * displayed_tolerance(settings.quality)
         return AdaptiveSampling(settings.edge_spp, tolerance, exposure_ev, beneath)
 
+    @property
+    def reach(self) -> int:
+        """Largest distance from an edge, in pixels, at which :meth:`refine` compares values.
+
+        Each doubling of the rays spreads by one pixel, and compares with the pixels around.
+        """
+        doublings = max(math.ceil(math.log2(self.most / EDGE_SPP)), 0)
+        return doublings + 1
+
     def has_visible_contrast(self, color: F32) -> Mask:
         """Pixels whose 3x3 neighbourhood spans more than twice the tolerance, as it is displayed, (H, W)."""
         shape = color.shape[0], color.shape[1]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from enfilade.arrays import to_half
+from enfilade.arrays import release_memory, to_half
 from enfilade.kernels.estimate import Estimate
 from enfilade.kernels.tone import luminance
 from enfilade.methods.base import Output
@@ -28,6 +28,7 @@ def shade(shot: ShotContext, frame: int) -> Output:
     diffuse_image = diffuse.shading.to_image(np.ones_like(refined))
     seen, count = diffuse.is_marked.reshape(refined.shape), diffuse.count
     del diffuse  # its sums take 200 bytes a pixel
+    release_memory()
     virtual = shot.virtual_images.find(geometry) if seen.any() else []
     specular = shade_specular(shot, frame, cache, seen, virtual, luminance(diffuse_image.color))
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from enfilade.arrays import to_float
+from enfilade.arrays import release_memory, to_float
 from enfilade.kernels.estimate import RayCount
 from enfilade.methods.decoupled.adaptive_sampling import (
     SPECULAR_CONTRAST,
@@ -89,11 +89,13 @@ def shade_specular(
     traced = [of.to_image(where) for of in estimate.shadings]
     count = estimate.count
     del estimate  # its sums take 80 bytes a pixel
+    release_memory()
 
     # Filter the AOVs along the surfaces that are seen in them.
     used = 1 + max((k for k, aov in enumerate(traced) if aov.color.any()), default=0)
     is_denoised = shot.settings.denoiser != "none"
     aovs = filter_spatially(virtual[:used], traced[:used], where, is_denoised=is_denoised)
+    del traced
 
     # Choose the edges: those in mirrors and panes, surfaces that centres miss, and those between surfaces
     # where the AOVs differ visibly. Aliasing is more visible than noise: its tolerance is a third of that of
@@ -107,7 +109,7 @@ def shade_specular(
         return SpecularShading(aovs, nowhere, no_variance, count)
 
     # Look up the AOVs over the whole pixel, and trace what the centres of the pixels around do not show well.
-    within = edges | is_seen_in
+    within = (edges | is_seen_in) & dilated(edges, sampling.reach)  # sums take 340 bytes a pixel
     fine = _looked_up(shot, frame, cache, aovs, where & ~is_traced_later, within)
     refined = sampling.refine(fine, within, edges, within, 0)
     layers = [of.to_image(within) for of in fine.shadings]
