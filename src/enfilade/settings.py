@@ -185,6 +185,13 @@ class ViewingSettings(Section):
         1.0, "Share of a frame's time for which the display shows it.", least=0.0, most=1.0
     )
     exposure_ev: float = option(0.0, "Exposure before the view transform, in stops.", least=-32.0, most=32.0)
+    white: float = option(
+        1.0,
+        "Exposed luminance from which the view shows white: 1 for sRGB, 16 for AgX and Filmic. `decoupled` "
+        "samples contrasts up to it.",
+        least=1.0,
+        most=65_504.0,
+    )
 
     def conditions(self, width_px: int, height_px: int, fps: float) -> Viewing:
         """Viewing conditions of images of a size.

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from enfilade.errors import SettingsError
-from enfilade.images.view import files_of_view, open_view, view_identity
+from enfilade.images.view import files_of_view, open_view, view_identity, white_of
 from enfilade.settings import VideoSettings
 
 CONFIG = """ocio_profile_version: 2
@@ -60,6 +60,22 @@ def test_opencolorio_gives_the_view_of_the_configuration(tmp_path, display, tran
     assert identity.keys() == {"opencolorio", "processor"}
     assert identity != view_identity(VideoSettings(ocio=file, view="Raw"))
     assert view_identity(VideoSettings()) == {}
+
+
+def test_the_white_of_a_view(tmp_path):
+    pytest.importorskip("PyOpenColorIO")
+    assert white_of(VideoSettings()) == white_of(VideoSettings(ocio=config(tmp_path))) == 1.0
+    # A view that shows a quarter of the light.
+    file = Path(config(tmp_path))
+    darker = (
+        "  - !<ColorSpace> {name: darker, from_scene_reference: "
+        "!<MatrixTransform> {matrix: [0.25, 0, 0, 0, 0, 0.25, 0, 0, 0, 0, 0.25, 0, 0, 0, 0, 1]}}\n"
+    )
+    views = file.read_text().replace(
+        "active_displays", "    - !<View> {name: Dark, colorspace: darker}\nactive_displays", 1
+    )
+    file.write_text(views + darker)
+    assert white_of(VideoSettings(ocio=str(file), view="Dark")) == 4.0
 
 
 def test_a_display_by_its_name(tmp_path):

@@ -9,8 +9,8 @@ from enfilade.camera.pinhole import Camera, look_at
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
 
 
-def opened_room(folder: Path) -> MitsubaRenderer:
-    """Write and open the scene."""
+def opened_room(folder: Path, radiance: float = 1.5) -> MitsubaRenderer:
+    """Write and open the scene, with the radiance of its lamp."""
     checks = (
         '<texture type="checkerboard" name="reflectance"><rgb name="color0" value="0.2, 0.3, 0.4"/>'
         '<rgb name="color1" value="0.7"/><transform name="to_uv"><scale x="12" y="12"/></transform></texture>'
@@ -29,7 +29,8 @@ def opened_room(folder: Path) -> MitsubaRenderer:
         _ball("bottle", (-1.2, 0.35, -1.8), 0.35,
               '<bsdf type="roughplastic"><rgb name="diffuse_reflectance" value="0.2, 0.4, 0.6"/>'
               '<float name="alpha" value="0.2"/></bsdf>'),
-        _lamp("lamp", '<scale value="1.2"/><rotate x="1" angle="90"/><translate y="2.45" z="-0.5"/>', 1.5),
+        _lamp("lamp", '<scale value="1.2"/><rotate x="1" angle="90"/><translate y="2.45" z="-0.5"/>',
+              radiance),
     ]  # fmt: skip
     # Paths of any length: the irradiance cache does not count the edges of a path.
     integrator = '<integrator type="path"><integer name="max_depth" value="-1"/></integrator>'

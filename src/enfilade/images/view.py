@@ -19,6 +19,7 @@ SRGB_TRANSFER = 13  # ITU-T H.273, table 3: IEC 61966-2-1
 LINEAR_REC709 = (
     "Linear Rec.709 (sRGB)", "lin_rec709", "Linear Rec.709", "lin_srgb", "Utility - Linear - sRGB",
 )  # fmt: skip
+MAX_WHITE_EV = 16.0  # stops above 1, up to which a view is searched for its white
 DISPLAYS = (("srgb", SRGB_TRANSFER), ("rec.1886", BT709_TRANSFER), ("rec.709", BT709_TRANSFER))
 
 
@@ -70,6 +71,16 @@ def open_view(settings: VideoSettings, exposure_ev: float) -> ViewTransform:
         return np.clip(values, 0.0, 1.0)
 
     return ViewTransform(encode, transfer)
+
+
+def white_of(settings: VideoSettings) -> float:
+    """Exposed luminance from which a view shows a neutral colour as its brightest, within one of 255 steps.
+
+    1 for sRGB, 16 for Blender's AgX; errors as above.
+    """
+    luminances = np.exp2(np.arange(0.0, MAX_WHITE_EV, 0.125)).astype(np.float32)
+    shown = open_view(settings, 0.0).encode(np.repeat(luminances[None, :, None], 3, axis=2))[0, :, 1]
+    return float(luminances[np.argmax(shown > shown.max() - 1.0 / 255.0)])
 
 
 def view_identity(settings: VideoSettings) -> dict[str, str]:

@@ -88,8 +88,8 @@ def write_report(
         notes.append(f"{dropped} samples were NaN or infinite and were left out")
     if shown.video.ocio:
         notes.append(
-            f"the video has the view {shown.video.view or 'default'} of {shown.video.ocio}; quality and "
-            "scores assume the sRGB curve, clipped at white"
+            f"the video has the view {shown.video.view or 'default'} of {shown.video.ocio}; scores "
+            "assume the sRGB curve, clipped at white"
         )
     for note in notes:
         monitor.message(note)

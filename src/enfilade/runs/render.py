@@ -12,6 +12,7 @@ from typing import Any
 from enfilade.errors import SettingsError, UnfinishedError
 from enfilade.files import write_json
 from enfilade.images.codecs import odd_size_note
+from enfilade.images.view import white_of
 from enfilade.methods.base import Task
 from enfilade.monitor import Monitor
 from enfilade.runs.delivery import ANALYSIS
@@ -22,9 +23,10 @@ from enfilade.runs.job import Job, read_job, write_job
 from enfilade.runs.ledger import LEDGER_FILE
 from enfilade.runs.scheduler import is_done, passes_of, shortened, work
 from enfilade.runs.statistics import statistics
-from enfilade.settings import LimitSettings, VideoSettings
+from enfilade.settings import LimitSettings, VideoSettings, ViewingSettings
 
 SUMMARY_FILE = "summary.json"
+MAX_WHITE_RATIO = 1.5  # of the white of a view and that of the settings
 
 
 def render(
@@ -209,5 +211,10 @@ def _created(job: Job, folder: Path, *, has_preflight: bool) -> RunFolder:
 def _video_notes(job: Job) -> list[str]:
     video = job.settings[VideoSettings]
     odd = odd_size_note(video.codec, job.path.width, job.path.height)
-    view = f"noise is measured after the sRGB curve, clipped at 1, not after the view of {video.ocio}"
-    return [note for note in (odd, view if video.ocio else "") if note]
+    sampled, shown = job.settings[ViewingSettings].white, white_of(video)
+    view = (
+        f"the view shows luminances up to {shown:g}; contrasts are sampled up to {sampled:g} "
+        f"(--set viewing.white={shown:g})"
+    )
+    is_other = max(shown / sampled, sampled / shown) > MAX_WHITE_RATIO
+    return [note for note in (odd, view if is_other else "") if note]

@@ -192,6 +192,19 @@ def test_edges_matter_where_the_display_shows_them():
     assert not white.any()
 
 
+def test_a_view_that_compresses_highlights_shows_their_contrast():
+    # Reinhard et al. 2002, Eq. 4: L (1 + L / 16^2) / (1 + L).
+    low, high = np.array([0.2, 4.0, 16.0]), np.array([0.25, 8.0, 32.0])
+    shown = [v * (1.0 + v / 256.0) / (1.0 + v) for v in (low, high)]
+    expected = 0.5 * np.subtract(*(srgb_encode(np.minimum(of, 1.0).astype(np.float32)) for of in shown[::-1]))
+    exposed = [lanes((v / 2.0).astype(np.float32)) for v in (low, high)]
+    found = np.array(displayed_deviation(*exposed, exposure_ev=1.0, white=16.0))
+    np.testing.assert_allclose(found, expected, atol=1e-6)
+    assert found[1] > 0.02
+    assert found[2] == 0.0
+    assert not np.array(displayed_deviation(*exposed, exposure_ev=1.0))[1:].any()
+
+
 def test_what_is_displayed_beneath_an_estimate_lowers_its_visible_deviation():
     everywhere = np.ones((H, W), bool)
     estimate = Means(everywhere, np.full((H, W), 0.02), np.full((H, W), 1e-4))

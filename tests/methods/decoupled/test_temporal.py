@@ -47,7 +47,7 @@ def test_accumulation_averages_noise_and_keeps_differences(tmp_path):
             for k, color in enumerate(colors)
         ]
         here, *others = (upload_aov(g, aov, g.is_hit) for g, aov in zip(geometries, aovs, strict=True))
-        return accumulate_temporally(geometries[0], here, [(other, 1.0) for other in others])
+        return accumulate_temporally(geometries[0], here, [(other, 1.0) for other in others], unit=1.0)
 
     where = geometries[0].is_hit
     averaged = accumulated(0.0)
@@ -58,16 +58,16 @@ def test_accumulation_averages_noise_and_keeps_differences(tmp_path):
     np.testing.assert_allclose(accumulated(5.0)[where], colors[0][where], atol=1e-2)
 
 
-def changed(values, exposure_ev=0.0, noise=NOISE):
+def changed(values, white=1.0, noise=NOISE):
     """The change of the first of seven frames, of which the right half is refined."""
-    deviation = np.where(WHERE, np.float32(noise / 2.0**exposure_ev), np.float32(0))
+    deviation = np.where(WHERE, np.float32(noise * white), np.float32(0))
     shown = [
-        upload_displayed([g, g], color, deviation, exposure_ev=exposure_ev)
+        upload_displayed([g, g], color, deviation, white=white)
         for g, color in zip(GEOMETRIES, values, strict=True)
     ]
-    here = redisplayed(shown[0], values[0], deviation, WHERE, exposure_ev=exposure_ev)
+    here = redisplayed(shown[0], values[0], deviation, WHERE, white=white)
     others = list(zip(shown[1:], WEIGHTS, strict=True))
-    found = accumulate_refined(GEOMETRIES[0], values[0], here, others, exposure_ev=exposure_ev)
+    found = accumulate_refined(GEOMETRIES[0], values[0], here, others, white=white)
     return found - values[0]
 
 
@@ -89,7 +89,7 @@ def test_noise_of_refined_pixels_falls_and_others_stay():
 def test_the_exposure_is_undone():
     change = changed(frames(np.full((HEIGHT, WIDTH, 1), 0.4)))
     exposed = [0.5 * one for one in frames(np.full((HEIGHT, WIDTH, 1), 0.4))]
-    np.testing.assert_allclose(changed(exposed, exposure_ev=1.0), 0.5 * change, atol=1e-3)
+    np.testing.assert_allclose(changed(exposed, white=0.5), 0.5 * change, atol=1e-3)
 
 
 def test_dark_bars_before_a_bright_sky_stay_dark():
@@ -110,12 +110,12 @@ def test_uncertain_edges_of_other_frames_do_not_brighten_dark_bars_that_are_cert
     """They had the weight of frames that are as certain: the bars became brighter by 0.23."""
     dark, edge = (np.full((HEIGHT, WIDTH, 3), value, np.float32) for value in (0.01, 0.4))
     shown = [
-        upload_displayed([g, g], color, np.full((HEIGHT, WIDTH), noise, np.float32), exposure_ev=0.0)
+        upload_displayed([g, g], color, np.full((HEIGHT, WIDTH), noise, np.float32), white=1.0)
         for g, color, noise in zip(GEOMETRIES, [dark, *[edge] * 6], [1e-3, *[0.5] * 6], strict=True)
     ]
-    here = redisplayed(shown[0], dark, np.full((HEIGHT, WIDTH), 1e-3, np.float32), WHERE, exposure_ev=0.0)
+    here = redisplayed(shown[0], dark, np.full((HEIGHT, WIDTH), 1e-3, np.float32), WHERE, white=1.0)
     others = list(zip(shown[1:], WEIGHTS, strict=True))
-    found = accumulate_refined(GEOMETRIES[0], dark, here, others, exposure_ev=0.0)
+    found = accumulate_refined(GEOMETRIES[0], dark, here, others, white=1.0)
     assert found.max() < 0.02
 
 

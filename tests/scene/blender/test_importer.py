@@ -100,6 +100,7 @@ def test_settings_of_the_file_stand_under_those_given(load, shot):
     assert made.tables_under({}) == {"viewing": {"exposure_ev": 0.5}, "video": {}}
     assert made.tables_under(given) == given
     (made.folder / "settings.toml").write_text(
+        "[viewing]\nwhite = 16.0\n"
         '[video]\nocio = "colormanagement/config.ocio"\nview = "AgX"\nlook = "Punchy"\n'
     )
     config = str(made.folder / "colormanagement" / "config.ocio")
@@ -107,7 +108,8 @@ def test_settings_of_the_file_stand_under_those_given(load, shot):
     assert made.tables_under({"video": {"view": "Raw"}})["video"] == {"ocio": config, "view": "Raw"}
     given = {"video": {"view": "Raw", "look": "Soft"}}
     assert made.tables_under(given)["video"] == {"ocio": config, **given["video"]}
-    assert made.tables_under({"video": {"ocio": ""}})["video"] == {"ocio": ""}
+    assert made.tables_under({})["viewing"] == {"white": 16.0}
+    assert made.tables_under({"video": {"ocio": ""}}) == {"viewing": {}, "video": {"ocio": ""}}
     (made.folder / "settings.toml").write_text("video = 1")
     with pytest.raises(SettingsError, match=r"\[video\] must be a table"):
         made.tables_under({})

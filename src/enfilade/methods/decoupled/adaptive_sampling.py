@@ -43,20 +43,23 @@ class AdaptiveSampling:
         In stops.
     beneath : (H, W) float32 or float
         Luminance of what is displayed together with the estimates, and is certain.
+    white : float
+        Exposed luminance from which the display shows white.
     """
 
     most: int
     tolerance: float
     exposure_ev: float
     beneath: F32 | float = 0.0
+    white: float = 1.0
 
     @staticmethod
     def of(walk: Walkthrough, *, times: float = 1.0, beneath: F32 | float = 0.0) -> AdaptiveSampling:
         """As the settings say, with a multiple of their tolerance."""
         settings = walk.settings[DecoupledSettings]
-        exposure_ev = walk.settings[ViewingSettings].exposure_ev
+        viewing = walk.settings[ViewingSettings]
         tolerance = times * displayed_tolerance(settings.quality)
-        return AdaptiveSampling(settings.edge_spp, tolerance, exposure_ev, beneath)
+        return AdaptiveSampling(settings.edge_spp, tolerance, viewing.exposure_ev, beneath, viewing.white)
 
     @property
     def reach(self) -> int:
@@ -113,7 +116,7 @@ class AdaptiveSampling:
         """Whether two luminances of pixels (UInt, flat indices) differ by twice the tolerance; Bool."""
         of = self.beneath
         beneath = dr.gather(Float, lanes(of), pixel) if isinstance(of, np.ndarray) else opaque(float(of))
-        deviation = displayed_deviation(low + beneath, high + beneath, self.exposure_ev)
+        deviation = displayed_deviation(low + beneath, high + beneath, self.exposure_ev, white=self.white)
         return deviation > opaque(self.tolerance)
 
     def refine(self, estimate: Estimate, sampled: Mask, edges: Mask, within: Mask, spp: int) -> Mask:
@@ -174,10 +177,17 @@ def displayed_tolerance(quality: float) -> float:
     return DISPLAYED_DEVIATION * math.sqrt(quality)
 
 
-def displayed_deviation(low: Any, high: Any, exposure_ev: float) -> Any:
-    """Half the difference between two luminances (Float) as they are displayed, sRGB-encoded, 0..1."""
+def displayed_deviation(low: Any, high: Any, exposure_ev: float, *, white: float = 1.0) -> Any:
+    """Half the difference between two luminances (Float) as they are displayed, sRGB-encoded, 0..1.
+
+    Views that show white from a higher luminance on, such as AgX, compress what is below it as the extended
+    curve of Reinhard et al. 2002 (Eq. 4) does.
+    """
     scale = opaque(2.0**exposure_ev)
-    low, high = (_srgb_encode(dr.clip(value * scale, 0.0, 1.0)) for value in (low, high))
+    exposed = [dr.maximum(value * scale, 0.0) for value in (low, high)]
+    if white > 1.0:
+        exposed = [v * (1.0 + v * opaque(1.0 / white**2)) / (1.0 + v) for v in exposed]
+    low, high = (_srgb_encode(dr.minimum(value, 1.0)) for value in exposed)
     return 0.5 * (high - low)
 
 

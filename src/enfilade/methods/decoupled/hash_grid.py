@@ -24,7 +24,7 @@ MIN_SAMPLES, MAX_ERROR = 4, 0.5  # fewest, and largest relative standard error, 
 NO_PARENT = np.uint64(0)
 MAX_ENTRIES = 1 << 22  # that are uploaded; of more, those with the most samples
 SEARCH_STEPS = (16, 8, 4, 2, 1)  # of a binary search in a bucket: up to 31 keys; the mean is at most one
-QUANTUM = 2.0**-30  # of estimates, radiance: sums up to 2^23 are exact in the 53 bits of a float64
+QUANTUM = 2.0**-30  # of estimates after exposure: sums up to 2^23 are exact in the 53 bits of a float64
 
 
 @dataclass(frozen=True)
@@ -178,7 +178,12 @@ class Entries:
     parents: npt.NDArray[np.uint64]
 
     @staticmethod
-    def of(levels: Sequence[npt.NDArray[np.uint64]], irradiance: npt.NDArray[np.floating[Any]]) -> Entries:
+    def of(
+        levels: Sequence[npt.NDArray[np.uint64]],
+        irradiance: npt.NDArray[np.floating[Any]],
+        *,
+        unit: float = 1.0,
+    ) -> Entries:
         """Sum up estimates in entries of rising size; those that are not finite are left out.
 
         They are rounded to :data:`QUANTUM`, so that sums are exact and independent of the order.
@@ -189,11 +194,18 @@ class Entries:
             Keys of each estimate, one a level.
         irradiance : (N, 3)
             Over pi.
+        unit
+            Radiance that is 1 after exposure.
         """
+        unit = 2.0 ** round(math.log2(unit))  # multiples of it are exact
         is_finite = np.isfinite(irradiance).all(axis=1)
         light = irradiance[is_finite].astype(np.float64)
         light, squares = (
-            np.rint(v / QUANTUM) * QUANTUM for v in (light, np.square(light @ REC709_LUMINANCE))
+            np.rint(v / quantum) * quantum
+            for v, quantum in (
+                (light, QUANTUM * unit),
+                (np.square(light @ REC709_LUMINANCE), QUANTUM * unit**2),
+            )
         )
         ones, keys = np.ones(len(light), np.int64), [level[is_finite] for level in levels]
         parents = [*keys[1:], np.full(len(light), NO_PARENT)]
@@ -231,7 +243,7 @@ class Entries:
         irradiance = self.sums / count[:, None]
         mean = irradiance @ REC709_LUMINANCE
         deviation = np.maximum(self.squares - count * np.square(mean), 0.0)  # sum of squared deviations
-        error = np.sqrt(deviation / (count * (count - 1))) / np.maximum(mean, QUANTUM)
+        error = np.sqrt(deviation / (count * (count - 1))) / np.maximum(mean, np.finfo(float).tiny)
         is_reliable = self._are_reliable(mean, deviation)
         chosen = np.flatnonzero(
             is_reliable | ((self.counts >= MIN_SAMPLES) & (error <= MAX_ERROR) & (mean > 0.0))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.hash_grid import Entries
@@ -13,6 +14,7 @@ from enfilade.methods.decoupled.light_camera import light_camera
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.virtual_images import IMAGING
 from enfilade.methods.decoupled.virtual_irradiance import trace_virtual_images
+from enfilade.records import F32
 from enfilade.renderer import PixelFilter, Purpose
 
 SPECULAR_SPP = 4  # specular rays of each pixel of the light camera
@@ -26,6 +28,9 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
     cache, walk = shot.prepass_cache(frame), shot.walk
     camera, geometry = light_camera(walk.path.cameras[frame]), shot.images.light_geometry(frame)
 
+    def collect(levels: list[npt.NDArray[np.uint64]], irradiance: F32) -> None:
+        parts.append(Entries.of(levels, irradiance, unit=shot.unit))
+
     # Path trace the surfaces that mirrors and panes show.
     virtual, count = trace_virtual_images(shot, frame)
 
@@ -38,7 +43,7 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
             camera,
             pixels,
             lambda rays, sampler, known=known: shot.integrator.specular_radiance(
-                known, shot.spawn(frame, rays, sampler), parts.append
+                known, shot.spawn(frame, rays, sampler), collect
             ),
             random,
             pixel_filter=PixelFilter.BOX,
@@ -52,7 +57,7 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
         camera,
         np.ones(camera.width * camera.height, np.bool_),
         lambda rays, sampler: shot.integrator.diffuse_radiance(
-            cache, shot.spawn(frame, rays, sampler), parts.append
+            cache, shot.spawn(frame, rays, sampler), collect
         ),
         walk.random(frame, Purpose.SEEN_HASH_GRID),
         pixel_filter=PixelFilter.GAUSSIAN,
@@ -64,9 +69,7 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
     gathered = shot.estimate(
         geometry.camera,
         geometry.has_diffuse,
-        lambda rays, sampler: shot.integrator.final_gather(
-            cache, shot.spawn(frame, rays, sampler), parts.append
-        ),
+        lambda rays, sampler: shot.integrator.final_gather(cache, shot.spawn(frame, rays, sampler), collect),
         walk.random(frame, Purpose.PREPASS_HASH_GRID),
     )
     gathered.add(GATHER_SPP)

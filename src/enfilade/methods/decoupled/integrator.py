@@ -13,12 +13,12 @@ from typing import Any
 
 import drjit as dr
 import numpy as np
+import numpy.typing as npt
 
 from enfilade.arrays import Array3f, Float, UInt, opaque, rows
 from enfilade.kernels.estimate import Samples
 from enfilade.kernels.replay import padded
 from enfilade.methods.decoupled.cache_query import CacheQuery
-from enfilade.methods.decoupled.hash_grid import Entries
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from enfilade.methods.decoupled.path_kernels import PathKernels, Vertex
 from enfilade.methods.decoupled.paths import (
@@ -30,12 +30,13 @@ from enfilade.methods.decoupled.paths import (
     scatter_add,
 )
 from enfilade.methods.decoupled.surface_image import UploadedImage
+from enfilade.records import F32
 from enfilade.renderer import Branch, LobeRenderer
 
 SPECULAR_AOVS = 2  # reflection, transmission
 JITTER = 3.0  # range of lookups in the hash grid, in widths of an entry
 
-OnMiss = Callable[[Entries], None]
+OnMiss = Callable[[list[npt.NDArray[np.uint64]], F32], None]  # keys by level, and irradiance over pi (N, 3)
 
 
 @dataclass(frozen=True)
@@ -331,9 +332,6 @@ class Integrator:
             weight, irradiance, keys = self.kernels.estimate(cache.path_guide, unknown)
             contributions.append((weight * irradiance, unknown.lane))
             if on_miss:
-                _report(on_miss, keys, irradiance, dr.width(missing))
+                count = dr.width(missing)
+                on_miss([np.array(key)[:count] for key in keys], rows(irradiance)[:count])
         return contributions
-
-
-def _report(on_miss: OnMiss, keys: tuple[Any, ...], irradiance: Any, count: int) -> None:
-    on_miss(Entries.of([np.array(key)[:count] for key in keys], rows(irradiance)[:count]))

@@ -31,7 +31,7 @@ from enfilade.methods.decoupled.virtual_images import VirtualImages
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.records import F32, Mask
 from enfilade.renderer import LobeRenderer, PixelFilter, RandomKey, Rays
-from enfilade.settings import DecoupledSettings, LimitSettings
+from enfilade.settings import DecoupledSettings, LimitSettings, ViewingSettings
 
 HASH_GRID_KEYFRAMES = 8  # nearest ones whose entries are looked up
 FADE = 0.25  # of the distance of the next keyframe, over which entries fade
@@ -92,6 +92,16 @@ class ShotContext:
     def frames(self) -> int:
         """Number of distinct frames."""
         return self._distance(self.keyframes[0], self.keyframes[-1]) + 1
+
+    @property
+    def unit(self) -> float:
+        """Radiance that is 1 after exposure."""
+        return float(2.0 ** -self.walk.settings[ViewingSettings].exposure_ev)
+
+    @property
+    def white(self) -> float:
+        """Radiance from which the display shows white."""
+        return self.unit * self.walk.settings[ViewingSettings].white
 
     def estimate(
         self,

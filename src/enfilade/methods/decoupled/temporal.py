@@ -26,13 +26,14 @@ from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.surface_image import MIN_FOUND_WEIGHT, UploadedImage, lookup, upload_layers
 from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
 from enfilade.records import F32, Frame, Geometry, Mask, Provenance, SurfaceClass
-from enfilade.settings import ViewingSettings
 
 MAX_DIFFERENCE = 3.0  # standard deviations, at which the weight of another frame falls to 1/e
 # Times the variance of a value, above which that of another frame lowers its weight: a dark pixel
 # beside a window is certain, and values of its edge in other frames are within their own large noise.
 MORE_NOISE = 50.0
-CERTAIN = 1e-5  # variance that is added to both: a value that is clipped at white has none of its own
+# Variance that is added to both, where exposed values are 0..1: what is clipped at white has none of its own.
+CERTAIN = 1e-5
+TINY = 1e-8  # deviation, likewise
 # Of the samples' deviation, which overestimates noise: rays are stratified, and the contrast of textures
 # counts as noise. The whole of it blurs pictures on a wall; half of it keeps nine tenths of the gain at metal
 # edges.
@@ -70,16 +71,18 @@ class TemporalAccumulation:
             aovs = {f: self._aovs(shot, f) for f in frames}
             for k, here in enumerate(aovs.pop(frame)):
                 neighbours = [(of[k], weights[f]) for f, of in aovs.items() if k < len(of)]
-                color = color + accumulate_temporally(geometry, here, neighbours)
+                color = color + accumulate_temporally(geometry, here, neighbours, unit=shot.unit)
 
         # Average refined pixels.
         if shaded.deviation.any():
             displayed = {f: self._displayed_image(shot, f) for f in frames}
             shown, where = displayed.pop(frame), shaded.deviation > 0
             deviation = to_float(shaded.deviation)
-            here = redisplayed(shown, color, deviation, where, exposure_ev=_exposure_ev(shot))
+            here = redisplayed(shown, color, deviation, where, white=shot.white)
             neighbours = [(other, weights[f]) for f, other in displayed.items()]
-            color = accumulate_refined(geometry, color, here, neighbours, exposure_ev=_exposure_ev(shot))
+            color = accumulate_refined(
+                geometry, color, here, neighbours, white=shot.white, unit=shot.unit / shot.white
+            )
 
         # Specular lobes that are a difference have negative samples: clip the sum.
         return Frame(np.maximum(color, 0.0), shaded.provenance)
@@ -90,7 +93,7 @@ class TemporalAccumulation:
         def make() -> UploadedImage:
             shaded, virtual = self._record(shot, frame), self._virtual_geometry(shot, frame)
             deviation = to_float(shaded.deviation)
-            return upload_displayed(virtual, shaded.color, deviation, exposure_ev=_exposure_ev(shot))
+            return upload_displayed(virtual, shaded.color, deviation, white=shot.white)
 
         return self._displayed.get(frame, make)
 
@@ -121,10 +124,6 @@ def window(path: CameraPath, shot: range, frame: int) -> list[int]:
     return list(path.distinct_frames[max(here - REACH, first) : min(here + REACH, last) + 1])
 
 
-def _exposure_ev(shot: ShotContext) -> float:
-    return shot.walk.settings[ViewingSettings].exposure_ev
-
-
 def upload_aov(geometry: Geometry, aov: SpecularAov, where: Mask) -> UploadedImage:
     """Upload a filtered AOV.
 
@@ -141,7 +140,7 @@ def upload_aov(geometry: Geometry, aov: SpecularAov, where: Mask) -> UploadedIma
 
 
 def accumulate_temporally(
-    geometry: Geometry, here: UploadedImage, others: Sequence[tuple[UploadedImage, float]]
+    geometry: Geometry, here: UploadedImage, others: Sequence[tuple[UploadedImage, float]], *, unit: float
 ) -> F32:
     """Average an AOV with that of neighbouring frames, reprojected along its own motion.
 
@@ -156,6 +155,8 @@ def accumulate_temporally(
         The AOV of the frame.
     others
         The same AOV of other frames, with weights relative to the frame's own.
+    unit
+        Value that is 1 after exposure.
 
     Returns
     -------
@@ -163,6 +164,7 @@ def accumulate_temporally(
         0 where the frame was not sampled.
     """
     color, variance = Array3f(here.values[0]), here.variances[0]
+    certain, tiny = opaque(CERTAIN * unit**2), opaque(TINY * unit)
 
     # Compute the apparent positions; virtual images face the eye.
     position = points_at(geometry.camera, here.depths)
@@ -179,8 +181,8 @@ def accumulate_temporally(
 
         # Weight by the difference, in units of the noise; far noisier values weigh less.
         difference = dr.abs(dr.dot(value, Array3f(*REC709_LUMINANCE)) - own)
-        frame_weight = dr.exp(-difference * dr.rcp(MAX_DIFFERENCE * dr.sqrt(noise + variance) + 1e-8))
-        frame_weight *= dr.minimum(MORE_NOISE * (variance + CERTAIN) * dr.rcp(noise + CERTAIN), 1.0)
+        frame_weight = dr.exp(-difference * dr.rcp(MAX_DIFFERENCE * dr.sqrt(noise + variance) + tiny))
+        frame_weight *= dr.minimum(MORE_NOISE * (variance + certain) * dr.rcp(noise + certain), 1.0)
         frame_weight = dr.select(found.weight > MIN_FOUND_WEIGHT, opaque(given) * frame_weight, 0.0)
 
         # Accumulate.
@@ -191,7 +193,7 @@ def accumulate_temporally(
 
 
 def upload_displayed(
-    virtual: Sequence[Geometry], color: F32, deviation: F32, *, exposure_ev: float
+    virtual: Sequence[Geometry], color: F32, deviation: F32, *, white: float
 ) -> UploadedImage:
     """Upload a frame as it is displayed, at the virtual images that its mirrors and panes show.
 
@@ -203,8 +205,8 @@ def upload_displayed(
         Linear radiance.
     deviation : (H, W) float32
         Standard deviation of the luminance.
-    exposure_ev
-        In stops.
+    white
+        Radiance from which the display shows white.
     """
     reflected, transmitted = virtual
     is_pane = reflected.surface == SurfaceClass.TRANSPARENT
@@ -213,27 +215,27 @@ def upload_displayed(
         depth=np.where(is_pane, transmitted.depth, reflected.depth),
         shape_index=np.where(is_pane, transmitted.shape_index, reflected.shape_index),
     )
-    displayed = _displayed(color, deviation, exposure_ev)
+    displayed = _displayed(color, deviation, white)
     return upload_aov(shown, displayed, np.ones(deviation.shape, np.bool_))
 
 
 def redisplayed(
-    whole: UploadedImage, color: F32, deviation: F32, where: Mask, *, exposure_ev: float
+    whole: UploadedImage, color: F32, deviation: F32, where: Mask, *, white: float
 ) -> UploadedImage:
     """An image of :func:`upload_displayed` with other colours, in some pixels only, (H, W)."""
-    shown = _displayed(color, deviation, exposure_ev)
+    shown = _displayed(color, deviation, white)
     depths = dr.select(lanes(where), whole.depths, 0.0)
     value, variance = lanes(shown.color), lanes(np.square(to_float(shown.deviation)))
     dr.eval(depths, value, variance)
     return replace(whole, depths=depths, values=(value,), variances=(variance,))
 
 
-def _displayed(color: F32, deviation: F32, exposure_ev: float) -> SpecularAov:
+def _displayed(color: F32, deviation: F32, white: float) -> SpecularAov:
     """Colours after exposure, 0..1, and their deviation.
 
     Above white there is no noise: bright pixels beside a dark line are not averaged with it.
     """
-    scale = np.float32(2.0**exposure_ev)
+    scale = np.float32(1.0 / white)
     mean, error = luminance(color) * scale, deviation * scale
     low, high = (np.clip(value, 0.0, 1.0) for value in (mean - error, mean + error))
     noise = np.float32(0.5 * DISPLAYED_NOISE_SHARE) * (high - low)
@@ -246,7 +248,8 @@ def accumulate_refined(
     here: UploadedImage,
     others: Sequence[tuple[UploadedImage, float]],
     *,
-    exposure_ev: float,
+    white: float,
+    unit: float = 1.0,
 ) -> F32:
     """Average the refined pixels of a frame with neighbouring frames.
 
@@ -261,13 +264,16 @@ def accumulate_refined(
     here, others
         Of :func:`upload_displayed`: the refined pixels of the frame, and whole frames with weights relative
         to its own.
-    exposure_ev
-        In stops.
+    white
+        Radiance from which the display shows white.
+    unit
+        Share of it that is 1 after exposure.
 
     Returns
     -------
     (H, W, 3) float32
         Linear radiance; pixels that are not refined stay.
     """
-    change: F32 = accumulate_temporally(geometry, here, others) - image(here.values[0], *color.shape[:2])
-    return color + change * np.float32(2.0**-exposure_ev)
+    shown = image(here.values[0], *color.shape[:2])
+    change: F32 = accumulate_temporally(geometry, here, others, unit=unit) - shown
+    return color + change * np.float32(white)

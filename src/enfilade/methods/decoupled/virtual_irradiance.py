@@ -96,5 +96,5 @@ def _trace(shot: ShotContext, frame: int, virtual: Geometry, choice: float) -> t
         guide = replace(virtual, depth=np.zeros_like(virtual.depth))
         denoised = denoise_light(guide, light, is_shown, quality=denoiser, outlier=OUTLIER)
         irradiance, times = denoised[is_traced], DENOISED_SAMPLES
-    entries = Entries.of([np.array(key)[chosen] for key in keys], irradiance).weighted(times)
-    return entries, estimate.count
+    entries = Entries.of([np.array(key)[chosen] for key in keys], irradiance, unit=shot.unit)
+    return entries.weighted(times), estimate.count

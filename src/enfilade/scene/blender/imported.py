@@ -132,15 +132,16 @@ class ImportedScene:
             ``settings.toml`` can't be read, or holds something else.
         """
         tables = read_tables(self.folder / SETTINGS_FILE)
-        video = tables.get("video", {})
+        video, viewing = tables.get("video", {}), dict(tables.get("viewing", {}))
         if "ocio" in given.get("video", {}):
             video = {}
+            viewing.pop("white", None)
         elif "ocio" in video:
             video = {**video, "ocio": str((self.folder / video["ocio"]).resolve())}
             if given.get("video", {}).get("view", video.get("view")) != video.get("view"):
                 video.pop("look", None)
         merged = dict(given)
-        for name, table in {**tables, "video": video}.items():
+        for name, table in {**tables, "viewing": viewing, "video": video}.items():
             merged[name] = {**table, **given.get(name, {})}
         return merged
 

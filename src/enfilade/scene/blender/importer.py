@@ -14,7 +14,7 @@ from typing import Any
 from enfilade.camera import check_size, load_path
 from enfilade.errors import CameraPathError, SceneError, SettingsError
 from enfilade.files import MARK, read_json, whole_folder, write_json
-from enfilade.images.view import files_of_view
+from enfilade.images.view import files_of_view, white_of
 from enfilade.monitor import Monitor
 from enfilade.scene.blender.find import Blender, find_blender
 from enfilade.scene.blender.imported import (
@@ -167,7 +167,7 @@ def _check(imported: ImportedScene, limits: LimitSettings) -> None:
 
 def _with_view(imported: ImportedScene, blender: Blender) -> ImportedScene:
     """Write the settings that come from the file, with Blender's view transform if it can be used."""
-    video, problem = _video(imported.view, blender, imported.folder)
+    video, white, problem = _video(imported.view, blender, imported.folder)
     notes = imported.notes
     if problem:
         view = imported.view
@@ -177,30 +177,31 @@ def _with_view(imported: ImportedScene, blender: Blender) -> ImportedScene:
         notes = (*notes, Note(NoteKind.NOT_CARRIED, imported.scene, "Color Management", what, effect))
         result = imported.folder / RESULT_FILE
         write_json(result, {**read_json(result), "notes": [note.to_json() for note in notes]})
-    tables: dict[str, dict[str, Any]] = {"viewing": {"exposure_ev": imported.exposure_ev}, "video": video}
+    viewing = {"exposure_ev": imported.exposure_ev, **({"white": white} if video else {})}
+    tables: dict[str, dict[str, Any]] = {"viewing": viewing, "video": video}
     (imported.folder / SETTINGS_FILE).write_text(_toml(tables), encoding="utf-8")
     return replace(imported, notes=notes)
 
 
-def _video(view: SourceView, blender: Blender, folder: Path) -> tuple[dict[str, str], str]:
-    """Settings of the video for a view, whose files are copied; or none, and why."""
+def _video(view: SourceView, blender: Blender, folder: Path) -> tuple[dict[str, str], float, str]:
+    """Settings of the video for a view, whose files are copied, and its white; or none, and why."""
     if view == SourceView("sRGB", "Standard", "None"):
-        return {}, ""
+        return {}, 1.0, ""
     config = blender.color_config()
     if config is None:
-        return {}, f"{blender.program} has no {CONFIG} where it is expected"
+        return {}, 1.0, f"{blender.program} has no {CONFIG} where it is expected"
     look = "" if view.look == "None" else view.look
     chosen = VideoSettings(ocio=str(config), display=view.display, view=view.view_transform, look=look)
     try:
-        files = files_of_view(chosen)
+        files, white = files_of_view(chosen), white_of(chosen)
     except SettingsError as error:
-        return {}, str(error)
+        return {}, 1.0, str(error)
     for file in files:
         copy = folder / COLORS / file.relative_to(config.parent)
         copy.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(file, copy)
     named = {"display": view.display, "view": view.view_transform, "look": look}
-    return {"ocio": f"{COLORS}/{CONFIG}", **named}, ""
+    return {"ocio": f"{COLORS}/{CONFIG}", **named}, white, ""
 
 
 def _toml(tables: Mapping[str, Mapping[str, Any]]) -> str:
