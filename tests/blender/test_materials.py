@@ -175,7 +175,7 @@ def test_a_mix_with_transparent_by_the_kind_of_ray_is_its_other_side(blender):
 
 
 @pytest.mark.parametrize(
-    "name", ["leaves", "lamps_in_the_way", "tilted", "painted_lamps", "single_scattering"]
+    "name", ["leaves", "lamps_in_the_way", "tilted", "painted_lamps", "single_scattering", "panes"]
 )
 def test_light_is_that_of_cycles(blender, name):
     (source,) = blender.make(name)

@@ -116,6 +116,11 @@ INPUTS = (
     ),
     ("Light Path", "approximated", "0: all rays see one material"),
     (
+        "Mix of clear glass and Transparent by Is Shadow Ray, as of windows",
+        "approximated",
+        "`thindielectric`: light passes, and what is seen through it is not bent",
+    ),
+    (
         "Mix with Transparent by Light Path, as of unlit glTF materials",
         "approximated",
         "the other shader, for all rays",

@@ -34,7 +34,7 @@ from enfilade_blender.materials.values import (
 )
 from enfilade_blender.notes import Notes
 
-ZERO = Constant((0.0,))
+ZERO, ONE, WHITE = Constant((0.0,)), Constant((1.0,)), Constant((1.0, 1.0, 1.0))
 DIELECTRIC_IOR = 1.45
 MULTIPLE, OTHER_DISTRIBUTIONS = "MULTI_GGX", ("BECKMANN", "ASHIKHMIN_SHIRLEY")  # of microfacets
 
@@ -226,13 +226,19 @@ class Graph:
             return None
         node = found.node
         if node.type == "FRESNEL":
-            ior = self.value(node.inputs["IOR"], found.groups)
-            return ior.number if isinstance(ior, Constant) else DIELECTRIC_IOR
+            return self._even_ior(self.value(node.inputs["IOR"], found.groups), node.name)
         if node.type == "LAYER_WEIGHT" and found.socket.name == "Fresnel":
             blend = self.value(node.inputs["Blend"], found.groups)
             share = blend.number if isinstance(blend, Constant) else 0.5
             return 1.0 / max(1.0 - share, 1e-3)
         return None
+
+    def _even_ior(self, ior: Value, node: str) -> float:
+        if isinstance(ior, Constant):
+            return ior.number
+        what, effect = f"a textured index of refraction is {DIELECTRIC_IOR}", "reflections are even"
+        self._notes.add("approximated", self._owner, node, what, effect)
+        return DIELECTRIC_IOR
 
     def _seen_side(self, mix: Any, first: Shader, second: Shader, groups: tuple[Any, ...]) -> Shader | None:
         """The side beside Transparent of a mix by the kind of ray alone; None of other mixes."""
@@ -240,13 +246,37 @@ class Graph:
         factor = follow(mix.inputs[0], groups)
         if is_clear == is_second_clear or not isinstance(factor, Output):
             return None
-        kinds = {output.node.type for output in upstream(factor)}
+        outputs = list(upstream(factor))
+        kinds = {output.node.type for output in outputs}
         if "LIGHT_PATH" not in kinds or not kinds <= table.COLOUR_NODES | {"LIGHT_PATH"}:
             return None
+        seen = second if is_clear else first
+        if any(output.socket.name == "Is Shadow Ray" for output in outputs):
+            pane = self._pane(seen, mix.name)
+            if pane is not None:
+                return pane
         what = "a surface that is transparent for some rays is so for none"
         effect = "the surface is seen, lights and casts shadows for all rays"
         self._notes.add("approximated", self._owner, mix.name, what, effect)
-        return second if is_clear else first
+        return seen
+
+    def _pane(self, glass: Shader, node: str) -> Shader | None:
+        """Thin glass, which shadow rays pass, in place of clear glass; None of other shaders."""
+        if isinstance(glass, Lobe) and glass.kind == "glass" and glass.roughness == ZERO:
+            colour, ior = glass.colour, glass.ior
+        elif isinstance(glass, Principled) and (
+            (glass["Transmission Weight"], glass["Roughness"], glass["Metallic"]) == (ONE, ZERO, ZERO)
+        ):
+            colour, ior = glass["Base Color"], glass["IOR"]
+        else:
+            return None
+        what, effect = (
+            "clear glass that shadow rays pass is thin glass",
+            "it does not bend what is seen through it",
+        )
+        self._notes.add("approximated", self._owner, node, what, effect)
+        clear, glossy = Lobe("transparent", colour, node), Lobe("glossy", WHITE, node)
+        return Mix(Constant((0.5,)), clear, glossy, self._even_ior(ior, node), node)
 
     def _note_metal(self, node: Any) -> None:
         stretch = node.inputs.get("Anisotropy")

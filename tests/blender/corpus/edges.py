@@ -10,6 +10,7 @@ import numpy as np
 
 from corpus.stage import (
     add,
+    box,
     cube,
     fill,
     finish,
@@ -646,6 +647,29 @@ def lamps_in_the_way(folder):
     card, tree, bsdf = shader("card", "BsdfPrincipled", Roughness=1.0)
     fill(tree, bsdf, {"Alpha": picture(tree, holes).outputs["Alpha"]})
     plane("Card", (0.0, 0.0, 3.2), 2.0, card)
+
+
+def panes(folder):
+    """Two panes that shadow rays pass, a box and a layer over Transparent, between a floor and a sun."""
+    scene = new_file()
+    scene.cycles.caustics_refractive = False  # else light passes the box twice: by shadow rays, and refracted
+    world((0.2, 0.2, 0.2))
+    scene.camera.location, scene.camera.rotation_euler = (0.0, 0.0, 1.5), (0.0, 0.0, 0.0)
+    plane("Floor", (0.0, 0.0, 0.0), 6.0, shader("floor", "BsdfDiffuse", Color=(0.5, 0.5, 0.5, 1))[0])
+    light("SUN", "Sun", (0.5, 0.0, 8.0), 3.0, angle=0.0)
+    window, tree, mix = shader("window", "MixShader")
+    ray = node_of(tree, "LightPath").outputs["Is Shadow Ray"]
+    glass = node_of(tree, "BsdfPrincipled", Base_Color=(1, 1, 1, 1), Transmission_Weight=1.0, Roughness=0.0)
+    fill(tree, mix, {0: ray, 1: glass, 2: node_of(tree, "BsdfTransparent")})
+    box("Window", (0.0, 0.0, 2.5), (4.0, 4.0, 0.02), window)
+    layer, tree, mix = shader("layer", "MixShader")
+    gloss = node_of(tree, "BsdfGlossy", Roughness=0.0)
+    fill(
+        tree,
+        mix,
+        {0: node_of(tree, "Fresnel", IOR=1.5).outputs[0], 1: node_of(tree, "BsdfTransparent"), 2: gloss},
+    )
+    plane("Layer", (0.0, 0.0, 3.0), 4.0, layer)
 
 
 def _grey(x, _y):
