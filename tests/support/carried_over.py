@@ -194,7 +194,11 @@ OBJECTS = (
         "not carried",
         "missing",
     ),
-    ("Ray visibility, shadow catcher, holdout, indirect only", "not carried", "visible to all rays"),
+    (
+        "Ray visibility of meshes, shadow catcher, holdout, indirect only",
+        "not carried",
+        "visible to all rays",
+    ),
     ("Transparent Shadows switched off", "not carried", "light passes where the surface is transparent"),
     ("Clipping of cameras", "not carried", "all is visible from the eye on"),
     (
