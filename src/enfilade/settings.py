@@ -187,10 +187,10 @@ class ViewingSettings(Section):
     exposure_ev: float = option(0.0, "Exposure before the view transform, in stops.", least=-32.0, most=32.0)
     white: float = option(
         1.0,
-        "Exposed luminance from which the view shows white: 1 for sRGB, 16 for AgX and Filmic. `decoupled` "
-        "samples contrasts up to it.",
+        "Exposed luminance that the tone curve shows as white, by which `decoupled` judges contrasts: 1 for "
+        "sRGB, 8 for AgX.",
         least=1.0,
-        most=65_504.0,
+        most=256.0,
     )
 
     def conditions(self, width_px: int, height_px: int, fps: float) -> Viewing:

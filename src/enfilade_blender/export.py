@@ -26,7 +26,7 @@ from enfilade_blender.shapes import Shapes
 from enfilade_blender.visibility import cast_count, note_depths, note_sun
 from enfilade_blender.world import environment
 
-GLASS = {"dielectric", "roughdielectric", "thindielectric"}
+GLASS = {"dielectric", "roughdielectric"}  # which stops shadow rays
 
 
 def export(job: Job) -> dict[str, Any]:

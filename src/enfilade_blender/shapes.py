@@ -25,6 +25,7 @@ from enfilade_blender.materials.values import (
     Lobe,
     Shader,
     Texture,
+    has_panes,
     normals_of,
     values_of,
 )
@@ -37,6 +38,7 @@ DEFAULT = Lobe("diffuse", Constant((0.8, 0.8, 0.8)), "no material")
 FLAT_TRIANGLES = 8_000_000  # a scene of more has instances
 INSTANCED_TRIANGLES = 500_000  # of all copies of a mesh that becomes instances
 FEW_INSTANCES = 16  # that a renderer does not expand: rays take 20 % more time with them
+MAX_PANE_RATIO = 0.05  # of the mean thickness of a pane to the root of its area
 FEW_COPIES = 64  # of an object that are baked one by one
 SAMPLED_EYES = 16  # of which backs are looked for
 BACK_OFFSET = 4e-5  # of a vertex' largest coordinate plus 1: rays begin at 9e-5, which pass the other side
@@ -276,10 +278,12 @@ class Shapes:
         material, part = of.part.material, of.part.name
         owner = of.part if of.is_own else None
         density = _uv_density(of)
-        key = material.name_full if material else "", is_mirrored, of.is_back_seen, owner, density
+        is_solid = has_panes(of.shader) and _is_solid(of.part)
+        key = material.name_full if material else "", is_mirrored, of.is_back_seen, owner, density, is_solid
         if key in self._surfaces:
             return self._surfaces[key]
-        context = replace(self._context(material, is_mirrored=is_mirrored), uv_density=density)
+        context = self._context(material, is_mirrored=is_mirrored)
+        context = replace(context, uv_density=density, is_solid=is_solid)
         surface = build(of.shader, context)
         back = build(of.shader, replace(context, is_back=True)) if of.is_back_seen else None
         element = surface.element(context, back)
@@ -287,7 +291,7 @@ class Shapes:
         identifier = self.identifiers.unique(f"{name}: {part}" if of.is_own else name)
         self._bsdfs.append(named(element, identifier))
         kinds = {nested.get("type") or "" for nested in element.iter("bsdf")}
-        if "mask" in kinds and not getattr(material, "use_transparent_shadow", True):
+        if kinds & {"mask", "thindielectric"} and not getattr(material, "use_transparent_shadow", True):
             what, effect = "that they are switched off is left out", "its shadow is lighter where it is clear"
             self._notes.add("not-carried", material.name, "Transparent Shadows", what, effect)
         if not surface.is_invisible:
@@ -300,6 +304,13 @@ class Shapes:
     def _context(self, material: Any, *, is_mirrored: bool = False) -> Context:
         owner = material.name if material else "no material"
         return Context(owner, self.textures, self._notes, is_mirrored)
+
+
+def _is_solid(part: _Part) -> bool:
+    """Whether a part of an object is closed, and thick for its size; a cube has a ratio of 0.14."""
+    mesh = part.mesh.transformed(part.placed.matrices[0])
+    area = mesh.area()
+    return mesh.is_closed() and 2.0 * abs(mesh.volume()) > MAX_PANE_RATIO * area**1.5
 
 
 def _is_instanced(placed: Placed, total: int) -> bool:

@@ -174,6 +174,30 @@ def test_a_mix_with_transparent_by_the_kind_of_ray_is_its_other_side(blender):
     assert ray["effect"] == "all rays see it as those do in Blender for which that is 0"
 
 
+def test_clear_glass_that_shadow_rays_pass_is_thin_but_on_solid_objects(blender):
+    code, out, result = blender.job(blender.make("kinds_of_panes")[0], "kinds of panes")
+    assert code == 0, result
+    root = ET.parse(out / "scene.xml").getroot()
+    assert root.find("integrator").get("type") == "volpath"
+    bsdfs = {element.get("id"): element for element in root.findall("bsdf")}
+    of = {shape.get("id"): bsdfs[shape.find("ref").get("id")] for shape in root.findall("shape")}
+    kinds = {name: bsdf.find(".//bsdf") or bsdf for name, bsdf in of.items()}
+    assert {name: kind.get("type") for name, kind in kinds.items() if not name.endswith("back")} == {
+        "Pane": "thindielectric",
+        "Ball": "dielectric",
+        "layered": "thindielectric",
+        "lit": "dielectric",
+        "swapped": "dielectric",
+    }
+    tint = of["Pane"].find("rgb[@name='specular_transmittance']").get("value").split()
+    assert [float(number) for number in tint] == pytest.approx([0.5] * 3)  # of each of two faces
+    noted = {(note["object"], note["what"]) for note in result["notes"]}
+    assert ("tinted", "clear glass that shadow rays pass is thin glass") in noted
+    assert ("tinted", "glass that shadow rays pass stops them on solid objects") in noted
+    other = {name for name, what in noted if "transparent for some rays" in what}
+    assert other == {"lit", "swapped"}
+
+
 @pytest.mark.parametrize(
     "name", ["leaves", "lamps_in_the_way", "tilted", "painted_lamps", "single_scattering", "panes"]
 )

@@ -165,6 +165,9 @@ def test_numbers_win_over_a_display(run, folders, tmp_path):
     options = ("--display", "desktop-24-fhd", "--settings", tmp_path / "a.toml")
     assert seen(*options) == pytest.approx((whole[0], 80.0))
     assert seen(*options, "--set", "viewing.peak_cd_m2=90") == pytest.approx((whole[0], 90.0))
+    # Of an imported scene's settings, the tone curve does not count here.
+    (tmp_path / "a.toml").write_text("[viewing]\npeak_cd_m2 = 80\nwhite = 8\n")
+    assert seen(*options) == pytest.approx((whole[0], 80.0))
 
 
 def test_layers_are_chosen_for_one_side_or_both(run, folders, tmp_path):

@@ -10,6 +10,7 @@ import pytest
 
 from enfilade.errors import SettingsError
 from enfilade.images.view import files_of_view, open_view, view_identity, white_of
+from enfilade.kernels.tone import compressed, srgb_encode
 from enfilade.settings import VideoSettings
 
 CONFIG = """ocio_profile_version: 2
@@ -65,17 +66,19 @@ def test_opencolorio_gives_the_view_of_the_configuration(tmp_path, display, tran
 def test_the_white_of_a_view(tmp_path):
     pytest.importorskip("PyOpenColorIO")
     assert white_of(VideoSettings()) == white_of(VideoSettings(ocio=config(tmp_path))) == 1.0
-    # A view that shows a quarter of the light.
-    file = Path(config(tmp_path))
-    darker = (
-        "  - !<ColorSpace> {name: darker, from_scene_reference: "
-        "!<MatrixTransform> {matrix: [0.25, 0, 0, 0, 0, 0.25, 0, 0, 0, 0, 0.25, 0, 0, 0, 0, 1]}}\n"
+    # A view with a tone curve of its own, as a table up to its white.
+    file, white = Path(config(tmp_path)), 8.0
+    curve = srgb_encode(compressed(np.linspace(0.0, white, 8193), white))
+    rows = "\n".join(f"{value:.7f}" for value in curve)
+    (tmp_path / "curve.spi1d").write_text(
+        f"Version 1\nFrom 0.0 {white}\nLength {len(curve)}\nComponents 1\n{{\n{rows}\n}}\n"
     )
-    views = file.read_text().replace(
-        "active_displays", "    - !<View> {name: Dark, colorspace: darker}\nactive_displays", 1
+    text = file.read_text().replace(
+        "active_displays", "    - !<View> {name: Soft, colorspace: soft}\nactive_displays", 1
     )
-    file.write_text(views + darker)
-    assert white_of(VideoSettings(ocio=str(file), view="Dark")) == 4.0
+    soft = "  - !<ColorSpace> {name: soft, from_scene_reference: !<FileTransform> {src: curve.spi1d}}\n"
+    file.write_text(text + soft)
+    assert white_of(VideoSettings(ocio=str(file), view="Soft")) == white
 
 
 def test_a_display_by_its_name(tmp_path):

@@ -118,7 +118,7 @@ INPUTS = (
     (
         "Mix of clear glass and Transparent by Is Shadow Ray, as of windows",
         "approximated",
-        "`thindielectric`: light passes, and what is seen through it is not bent",
+        "`thindielectric`: light passes, nothing is bent; on thick objects glass, which stops light",
     ),
     (
         "Mix with Transparent by Light Path, as of unlit glTF materials",

@@ -173,7 +173,10 @@ def _options(
         raise SettingsError(f"--layer is given {len(layers)} times; give it once, or for TEST and REFERENCE")
     settings = settings_of(ctx, SECTIONS)
     of_metric = () if mode == "paper" else ("pursuit",)
-    check_effect(ctx, f"a comparison of mode {mode}", {ViewingSettings: (), MetricSettings: of_metric})
+    of_viewing = {name for name in ViewingSettings().to_table() if name != "white"}
+    check_effect(
+        ctx, f"a comparison of mode {mode}", {ViewingSettings: of_viewing, MetricSettings: of_metric}
+    )
     viewing = settings[ViewingSettings]
     return CompareOptions(
         viewing=viewing,
@@ -191,7 +194,7 @@ def _options(
 def _display(ctx: click.Context, name: str, viewing: ViewingSettings) -> Display:
     from enfilade.viewing import display_named
 
-    numbers = given_in(ctx, ViewingSettings) - {"exposure_ev"}
+    numbers = given_in(ctx, ViewingSettings) - {"exposure_ev", "white"}
     return replace(display_named(name), **{number: getattr(viewing, number) for number in numbers})
 
 

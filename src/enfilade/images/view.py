@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from enfilade.errors import SettingsError
-from enfilade.kernels.tone import srgb_encode
+from enfilade.kernels.tone import compressed, srgb_encode
 from enfilade.records import F32
 from enfilade.settings import VideoSettings
 
@@ -19,7 +19,7 @@ SRGB_TRANSFER = 13  # ITU-T H.273, table 3: IEC 61966-2-1
 LINEAR_REC709 = (
     "Linear Rec.709 (sRGB)", "lin_rec709", "Linear Rec.709", "lin_srgb", "Utility - Linear - sRGB",
 )  # fmt: skip
-MAX_WHITE_EV = 16.0  # stops above 1, up to which a view is searched for its white
+WHITES = np.exp2(np.arange(0.0, 8.5, 0.5))  # exposed luminances that a view may show as white
 DISPLAYS = (("srgb", SRGB_TRANSFER), ("rec.1886", BT709_TRANSFER), ("rec.709", BT709_TRANSFER))
 
 
@@ -74,13 +74,14 @@ def open_view(settings: VideoSettings, exposure_ev: float) -> ViewTransform:
 
 
 def white_of(settings: VideoSettings) -> float:
-    """Exposed luminance from which a view shows a neutral colour as its brightest, within one of 255 steps.
+    """White of the extended curve of Reinhard et al. 2002 that is nearest to a view's, for neutral colours.
 
     1 for sRGB, 16 for Blender's AgX; errors as above.
     """
-    luminances = np.exp2(np.arange(0.0, MAX_WHITE_EV, 0.125)).astype(np.float32)
+    luminances = np.exp2(np.arange(-7.0, 7.25, 0.25)).astype(np.float32)
     shown = open_view(settings, 0.0).encode(np.repeat(luminances[None, :, None], 3, axis=2))[0, :, 1]
-    return float(luminances[np.argmax(shown > shown.max() - 1.0 / 255.0)])
+    curves = [srgb_encode(np.minimum(compressed(luminances, white), 1.0)) for white in WHITES]
+    return float(WHITES[np.argmin([np.abs(curve - shown).max() for curve in curves])])
 
 
 def view_identity(settings: VideoSettings) -> dict[str, str]:

@@ -7,6 +7,8 @@ videos with a view of an OpenColorIO configuration, which may compress highlight
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from enfilade.errors import InputError
@@ -65,6 +67,11 @@ def srgb_decode(encoded: F32) -> F32:
     curved = shifted ** np.float32(SRGB_GAMMA)
     linear: F32 = np.where(encoded <= SRGB_ENCODED_LIMIT, encoded / SRGB_SLOPE, curved)
     return linear
+
+
+def compressed(exposed: Any, white: Any) -> Any:
+    """Luminances (...) by the extended curve of Reinhard et al. 2002 (Eq. 4); those of `white` become 1."""
+    return exposed * (1.0 + exposed / white**2) / (1.0 + exposed)
 
 
 def luminance(linear_rgb: F32) -> F32:

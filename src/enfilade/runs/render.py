@@ -23,7 +23,7 @@ from enfilade.runs.job import Job, read_job, write_job
 from enfilade.runs.ledger import LEDGER_FILE
 from enfilade.runs.scheduler import is_done, passes_of, shortened, work
 from enfilade.runs.statistics import statistics
-from enfilade.settings import LimitSettings, VideoSettings, ViewingSettings
+from enfilade.settings import DecoupledSettings, LimitSettings, VideoSettings, ViewingSettings
 
 SUMMARY_FILE = "summary.json"
 MAX_WHITE_RATIO = 1.5  # of the white of a view and that of the settings
@@ -210,11 +210,14 @@ def _created(job: Job, folder: Path, *, has_preflight: bool) -> RunFolder:
 
 def _video_notes(job: Job) -> list[str]:
     video = job.settings[VideoSettings]
-    odd = odd_size_note(video.codec, job.path.width, job.path.height)
-    sampled, shown = job.settings[ViewingSettings].white, white_of(video)
-    view = (
-        f"the view shows luminances up to {shown:g}; contrasts are sampled up to {sampled:g} "
-        f"(--set viewing.white={shown:g})"
-    )
-    is_other = max(shown / sampled, sampled / shown) > MAX_WHITE_RATIO
-    return [note for note in (odd, view if is_other else "") if note]
+    notes = [odd_size_note(video.codec, job.path.width, job.path.height)]
+    if DecoupledSettings in job.opened_method().settings:
+        sampled, shown = job.settings[ViewingSettings].white, white_of(video)
+        if max(shown / sampled, sampled / shown) > MAX_WHITE_RATIO:
+            notes.append(
+                f"contrasts are sampled for a view that shows luminances up to {sampled:g}, not for that of "
+                f"the video; --set viewing.white={shown:g} is nearer to it"
+            )
+    elif video.ocio:
+        notes.append(f"the method assumes the sRGB curve, clipped at 1, not the view of {video.ocio}")
+    return [note for note in notes if note]

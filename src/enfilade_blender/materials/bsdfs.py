@@ -58,6 +58,7 @@ class Context:
     notes: Notes
     is_mirrored: bool = False  # the UV map, below normal maps
     is_back: bool = False  # the side of a surface that normals point away from
+    is_solid: bool = False  # the object is closed, and no pane
     uv_density: float = 1.0  # texture coordinates for each scene unit
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from enfilade_blender.materials import table
+from enfilade_blender.materials.bsdfs import is_one, is_zero
 from enfilade_blender.materials.links import dependence, follow, image_coordinates, upstream
 from enfilade_blender.materials.values import (
     PRINCIPLED,
@@ -34,7 +35,8 @@ from enfilade_blender.materials.values import (
 )
 from enfilade_blender.notes import Notes
 
-ZERO, ONE, WHITE = Constant((0.0,)), Constant((1.0,)), Constant((1.0, 1.0, 1.0))
+ZERO, WHITE = Constant((0.0,)), Constant((1.0, 1.0, 1.0))
+SMOOTH = 0.03  # roughness below which glass is clear
 DIELECTRIC_IOR = 1.45
 MULTIPLE, OTHER_DISTRIBUTIONS = "MULTI_GGX", ("BECKMANN", "ASHIKHMIN_SHIRLEY")  # of microfacets
 
@@ -126,8 +128,9 @@ class Graph:
         first, second = (self.shader(node.inputs[i], groups) for i in (1, 2))
         if (seen := self._seen_side(node, first, second, groups)) is not None:
             return seen
-        ior = self._fresnel(node.inputs[0], groups)
-        if ior is not None and isinstance(second, Lobe) and second.kind == "glossy":
+        is_layer = isinstance(second, Lobe) and second.kind == "glossy"
+        ior = self._fresnel(node.inputs[0], groups) if is_layer else None
+        if ior is not None:
             return Mix(Constant((0.5,)), first, second, ior, node.name)
         return Mix(self.value(node.inputs[0], groups), first, second, None, node.name)
 
@@ -242,7 +245,7 @@ class Graph:
 
     def _seen_side(self, mix: Any, first: Shader, second: Shader, groups: tuple[Any, ...]) -> Shader | None:
         """The side beside Transparent of a mix by the kind of ray alone; None of other mixes."""
-        is_clear, is_second_clear = (isinstance(s, Lobe) and s.kind == "transparent" for s in (first, second))
+        is_clear, is_second_clear = _is_clear(first), _is_clear(second)
         factor = follow(mix.inputs[0], groups)
         if is_clear == is_second_clear or not isinstance(factor, Output):
             return None
@@ -251,32 +254,15 @@ class Graph:
         if "LIGHT_PATH" not in kinds or not kinds <= table.COLOUR_NODES | {"LIGHT_PATH"}:
             return None
         seen = second if is_clear else first
-        if any(output.socket.name == "Is Shadow Ray" for output in outputs):
-            pane = self._pane(seen, mix.name)
-            if pane is not None:
+        if is_second_clear and _is_of_shadow_rays(outputs):
+            if isinstance(seen, Mix) and seen.fresnel_ior is not None and _is_clear(seen.first):
+                return seen  # thin glass, which shadow rays pass
+            if (pane := _pane(seen, mix.name)) is not None:
                 return pane
         what = "a surface that is transparent for some rays is so for none"
         effect = "the surface is seen, lights and casts shadows for all rays"
         self._notes.add("approximated", self._owner, mix.name, what, effect)
         return seen
-
-    def _pane(self, glass: Shader, node: str) -> Shader | None:
-        """Thin glass, which shadow rays pass, in place of clear glass; None of other shaders."""
-        if isinstance(glass, Lobe) and glass.kind == "glass" and glass.roughness == ZERO:
-            colour, ior = glass.colour, glass.ior
-        elif isinstance(glass, Principled) and (
-            (glass["Transmission Weight"], glass["Roughness"], glass["Metallic"]) == (ONE, ZERO, ZERO)
-        ):
-            colour, ior = glass["Base Color"], glass["IOR"]
-        else:
-            return None
-        what, effect = (
-            "clear glass that shadow rays pass is thin glass",
-            "it does not bend what is seen through it",
-        )
-        self._notes.add("approximated", self._owner, node, what, effect)
-        clear, glossy = Lobe("transparent", colour, node), Lobe("glossy", WHITE, node)
-        return Mix(Constant((0.5,)), clear, glossy, self._even_ior(ior, node), node)
 
     def _note_metal(self, node: Any) -> None:
         stretch = node.inputs.get("Anisotropy")
@@ -304,6 +290,54 @@ class Graph:
             effect = table.OBJECT_EFFECT
         self._notes.add("approximated", self._owner, found.node.name, what, effect)
         return value
+
+
+def _is_clear(shader: Shader) -> bool:
+    return isinstance(shader, Lobe) and shader.kind == "transparent"
+
+
+def _is_of_shadow_rays(outputs: list[Output]) -> bool:
+    """Whether a factor is 1 for shadow rays, and 0 for those of the camera: one or several kinds of rays."""
+    kinds = {output.socket.name for output in outputs if output.node.type == "LIGHT_PATH"}
+    others = [output.node for output in outputs if output.node.type != "LIGHT_PATH"]
+    are_sums = all(node.type == "MATH" and node.operation in ("ADD", "MAXIMUM") for node in others)
+    return "Is Shadow Ray" in kinds and "Is Camera Ray" not in kinds and are_sums
+
+
+def _pane(glass: Shader, node: str) -> Mix | None:
+    """Clear glass as thin glass; None of other shaders."""
+    if isinstance(glass, Mix) and glass.fresnel_ior is not None and isinstance(glass.first, Lobe):
+        glass = replace(
+            glass.first, ior=Constant((glass.fresnel_ior,))
+        )  # below a layer of its own reflection
+    if isinstance(glass, Lobe) and glass.kind == "glass" and _is_smooth(glass.roughness):
+        tint, reflected, ior = glass.colour, glass.colour, glass.ior
+    elif isinstance(glass, Principled) and _is_plain_glass(glass):
+        # Twice through an interface is once through the colour.
+        root = tuple(math.sqrt(max(number, 0.0)) for number in glass["Base Color"].colour)
+        tint, reflected, ior = Constant(root), WHITE, glass["IOR"]
+    else:
+        return None
+    if not isinstance(ior, Constant):
+        return None
+    clear, glossy = Lobe("transparent", tint, node), Lobe("glossy", reflected, node, normal=glass.normal)
+    return Mix(Constant((0.5,)), clear, glossy, ior.number, node, is_pane=True)
+
+
+def _is_plain_glass(shader: Principled) -> bool:
+    """Whether it is clear glass of one colour, and nothing else."""
+    rest = ("Metallic", "Emission Strength", "Coat Weight", "Sheen Weight")
+    return (
+        is_one(shader["Transmission Weight"])
+        and is_one(shader["Alpha"])
+        and _is_smooth(shader["Roughness"])
+        and isinstance(shader["Base Color"], Constant)
+        and all(is_zero(shader[name]) for name in rest)
+    )
+
+
+def _is_smooth(roughness: Value) -> bool:
+    return isinstance(roughness, Constant) and roughness.number < SMOOTH
 
 
 def _texture(found: Output) -> Output | None:

@@ -29,7 +29,7 @@ def thin_ior(ior: float) -> float:
 
     A pane whose sides reflect r each reflects 2 r / (1 + r).
     """
-    reflectance = ((ior - 1.0) / (ior + 1.0)) ** 2
+    reflectance = min(((ior - 1.0) / (ior + 1.0)) ** 2, 0.99)
     root = math.sqrt(reflectance / (2.0 - reflectance))
     return (1.0 + root) / (1.0 - root)
 

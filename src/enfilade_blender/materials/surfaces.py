@@ -171,6 +171,19 @@ def _mix(mix: Mix, context: Context) -> Surface:
     if is_zero(mix.factor) or is_one(mix.factor):
         return _part(mix.second if is_one(mix.factor) else mix.first, context)
     if mix.fresnel_ior is not None and isinstance(mix.second, Lobe):
+        if mix.is_pane and isinstance(mix.first, Lobe):
+            if context.is_solid:
+                what, effect = "glass that shadow rays pass stops them on solid objects", "shadows are darker"
+                context.notes.add("approximated", context.owner, mix.name, what, effect)
+                return Surface(
+                    lobe_bsdf(replace(mix.first, kind="glass", ior=Constant((mix.fresnel_ior,))), context)
+                )
+            what = "clear glass that shadow rays pass is thin glass"
+            effect = (
+                "it does not bend what is seen through it; with refractive caustics, Blender counts light "
+                "through it twice"
+            )
+            context.notes.add("approximated", context.owner, mix.name, what, effect)
         return _interface(mix.first, mix.second, mix.fresnel_ior, context)
     first, second = _part(mix.first, context), _part(mix.second, context)
     if first.is_invisible and not first.emitted:

@@ -224,13 +224,17 @@ class Emission:
 
 @dataclass(frozen=True)
 class Mix:
-    """A share of the second shader, the rest of the first; `fresnel_ior` where the share is Fresnel's."""
+    """A share of the second shader, the rest of the first; `fresnel_ior` where the share is Fresnel's.
+
+    `is_pane`: clear glass that shadow rays pass, as thin glass, which it is but on solid objects.
+    """
 
     factor: Value
     first: Shader
     second: Shader
     fresnel_ior: float | None
     name: str
+    is_pane: bool = False
 
 
 @dataclass(frozen=True)
@@ -264,6 +268,13 @@ def normals_of(shader: Shader) -> list[Normal]:
     if isinstance(shader, Mix | Add):
         return normals_of(shader.first) + normals_of(shader.second)
     return [shader.normal] if isinstance(shader, Principled | Lobe) else []
+
+
+def has_panes(shader: Shader) -> bool:
+    """Whether a part of a shader is glass that shadow rays pass."""
+    if isinstance(shader, Mix | Add):
+        return getattr(shader, "is_pane", False) or has_panes(shader.first) or has_panes(shader.second)
+    return False
 
 
 def values_of(shader: Any) -> Iterator[Value | ProceduralNormal]:

@@ -672,6 +672,35 @@ def panes(folder):
     plane("Layer", (0.0, 0.0, 3.0), 4.0, layer)
 
 
+def kinds_of_panes(folder):
+    """Glass that shadow rays pass: tinted, thick, below a layer, with light of its own, and the reverse."""
+    new_file()
+    half = {"Base_Color": (0.25, 0.25, 0.25, 1), "Transmission_Weight": 1.0, "Roughness": 0.02}
+
+    def window(name, glass, *, is_swapped=False):
+        material, tree, mix = shader(name, "MixShader")
+        seen, clear = glass(tree), node_of(tree, "BsdfTransparent")
+        most = node_of(tree, "Math")
+        most.operation = "MAXIMUM"
+        path = node_of(tree, "LightPath").outputs
+        fill(tree, most, {0: path["Is Shadow Ray"], 1: path["Is Diffuse Ray"]})
+        fill(tree, mix, {0: most, 1: clear if is_swapped else seen, 2: seen if is_swapped else clear})
+        return material
+
+    def layered(tree):
+        mix, glass = node_of(tree, "MixShader"), node_of(tree, "BsdfGlass", Roughness=0.0, IOR=1.5)
+        fill(tree, mix, {0: node_of(tree, "Fresnel", IOR=1.5), 1: glass, 2: node_of(tree, "BsdfGlossy")})
+        return mix
+
+    tinted = window("tinted", lambda tree: node_of(tree, "BsdfPrincipled", **half))
+    box("Pane", (0.0, 0.0, 0.0), (1.0, 1.0, 0.01), tinted)
+    sphere("Ball", (2.0, 0.0, 0.0), 0.5, tinted)
+    lit = window("lit", lambda tree: node_of(tree, "BsdfPrincipled", **half, Emission_Strength=1.0))
+    swapped = window("swapped", lambda tree: node_of(tree, "BsdfGlass", Roughness=0.0), is_swapped=True)
+    for number, material in enumerate((window("layered", layered), lit, swapped)):
+        plane(material.name, (2.0 * number, 2.0, 0.0), 1.5, material)
+
+
 def _grey(x, _y):
     return np.full((*x.shape, 3), 0.8)
 

@@ -109,6 +109,7 @@ def test_settings_of_the_file_stand_under_those_given(load, shot):
     given = {"video": {"view": "Raw", "look": "Soft"}}
     assert made.tables_under(given)["video"] == {"ocio": config, **given["video"]}
     assert made.tables_under({})["viewing"] == {"white": 16.0}
+    assert made.tables_under({"video": {"view": "Raw"}})["viewing"] == {}
     assert made.tables_under({"video": {"ocio": ""}}) == {"viewing": {}, "video": {"ocio": ""}}
     (made.folder / "settings.toml").write_text("video = 1")
     with pytest.raises(SettingsError, match=r"\[video\] must be a table"):

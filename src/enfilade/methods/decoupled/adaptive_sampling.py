@@ -16,6 +16,7 @@ from enfilade.kernels.tone import (
     SRGB_LINEAR_LIMIT,
     SRGB_OFFSET,
     SRGB_SLOPE,
+    compressed,
     luminance,
 )
 from enfilade.methods.decoupled.edges import beside, dilated
@@ -44,7 +45,7 @@ class AdaptiveSampling:
     beneath : (H, W) float32 or float
         Luminance of what is displayed together with the estimates, and is certain.
     white : float
-        Exposed luminance from which the display shows white.
+        Exposed luminance that the tone curve shows as white.
     """
 
     most: int
@@ -180,13 +181,12 @@ def displayed_tolerance(quality: float) -> float:
 def displayed_deviation(low: Any, high: Any, exposure_ev: float, *, white: float = 1.0) -> Any:
     """Half the difference between two luminances (Float) as they are displayed, sRGB-encoded, 0..1.
 
-    Views that show white from a higher luminance on, such as AgX, compress what is below it as the extended
-    curve of Reinhard et al. 2002 (Eq. 4) does.
+    Views that show white from a higher luminance on, such as AgX, compress what is below it.
     """
     scale = opaque(2.0**exposure_ev)
     exposed = [dr.maximum(value * scale, 0.0) for value in (low, high)]
     if white > 1.0:
-        exposed = [v * (1.0 + v * opaque(1.0 / white**2)) / (1.0 + v) for v in exposed]
+        exposed = [compressed(value, opaque(white)) for value in exposed]
     low, high = (_srgb_encode(dr.minimum(value, 1.0)) for value in exposed)
     return 0.5 * (high - low)
 

@@ -100,7 +100,7 @@ class ShotContext:
 
     @property
     def white(self) -> float:
-        """Radiance from which the display shows white."""
+        """Radiance that the tone curve shows as white."""
         return self.unit * self.walk.settings[ViewingSettings].white
 
     def estimate(

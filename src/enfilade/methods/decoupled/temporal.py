@@ -206,7 +206,7 @@ def upload_displayed(
     deviation : (H, W) float32
         Standard deviation of the luminance.
     white
-        Radiance from which the display shows white.
+        Radiance that the tone curve shows as white.
     """
     reflected, transmitted = virtual
     is_pane = reflected.surface == SurfaceClass.TRANSPARENT
@@ -265,7 +265,7 @@ def accumulate_refined(
         Of :func:`upload_displayed`: the refined pixels of the frame, and whole frames with weights relative
         to its own.
     white
-        Radiance from which the display shows white.
+        Radiance that the tone curve shows as white.
     unit
         Share of it that is 1 after exposure.
 

@@ -124,7 +124,8 @@ class ImportedScene:
     def tables_under(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """Tables of settings of the file, under those that are given, which win.
 
-        A given configuration of OpenColorIO replaces the file's view as a whole, another view its look.
+        A given configuration of OpenColorIO replaces the file's view as a whole, another view its look. The
+        file's white goes with its view.
 
         Raises
         ------
@@ -133,7 +134,10 @@ class ImportedScene:
         """
         tables = read_tables(self.folder / SETTINGS_FILE)
         video, viewing = tables.get("video", {}), dict(tables.get("viewing", {}))
-        if "ocio" in given.get("video", {}):
+        changed = given.get("video", {})
+        if any(changed.get(name, video.get(name)) != video.get(name) for name in ("view", "display", "look")):
+            viewing.pop("white", None)
+        if "ocio" in changed:
             video = {}
             viewing.pop("white", None)
         elif "ocio" in video:
