@@ -28,14 +28,7 @@ SMALL = (
     *(f"denoised-{name}" for name in ("8", "16", "32", "32-followed", "64", "128", "8-accumulated-after")),
     "decoupled-60", "decoupled-10",
 )  # fmt: skip
-LARGE = (
-    "denoised-8",
-    "denoised-8-fast",
-    "denoised-32",
-    "denoised-32-followed",
-    "decoupled-60",
-    "decoupled-10",
-)
+LARGE = ("denoised-8", "denoised-32", "decoupled-60", "decoupled-10")
 LARGE_PX = 500_000  # from this size on, few configurations
 NAME = re.compile(r"(traced|denoised|paper|decoupled)-(\d+(?:\.\d+)?)(?:-(.+))?")
 SEGMENTS = re.compile(r"unsplit|uniform-(\d+)")  # of paper: without refinement
