@@ -47,7 +47,7 @@ def main() -> int:
         "--scene",
         nargs="+",
         choices=GENERATED,
-        help="generated scenes; all by default, two of large images",
+        help="generated scenes; all by default, COURTYARD of large images",
     )
     parser.add_argument(
         "--scenes",

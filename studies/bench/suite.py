@@ -165,5 +165,5 @@ def summary(benches: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 GENERATED = SCENES
-LARGE_SCENES = ("kitchen", "courtyard")
+LARGE_SCENES = ("courtyard",)
 QUICK_SCENES = ("room", "courtyard")  # one of each split

@@ -161,9 +161,12 @@ def test_a_hash_grid_without_images_gives_its_light(diffuse):
     parts = []
     camera = front_camera()
 
+    def collect(levels, irradiance):
+        parts.append(Entries.of(levels, irradiance))
+
     def radiance(rays, sampler):
         integrator = integrator_of(renderer)
-        return integrator.final_gather(EMPTY, camera_paths(rays, sampler), parts.append)
+        return integrator.final_gather(EMPTY, camera_paths(rays, sampler), collect)
 
     estimated(radiance, camera, 64, layers=2)
     grid = Entries.joined(parts).upload()
