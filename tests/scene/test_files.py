@@ -2,6 +2,8 @@
 
 import errno
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -40,6 +42,25 @@ def test_a_shape_group_inside_an_instance_is_refused(scene):
     refused(file, r"holds its shape group: move it to the top of the scene and refer to it by <ref id=")
     named = group.replace(">", ' id="group">', 1)
     check_scene(scene(f'{named}<shape type="instance"><ref id="group"/></shape>'), LimitSettings())
+
+
+def test_scenes_are_checked_before_a_variant_is_chosen(scene):
+    # As by the command, in a process of its own. Mitsuba can't convert transforms and colours there.
+    moved = '<transform name="to_world"><translate x="1"/></transform>'
+    group = '<shape type="shapegroup" id="group"><shape type="cube"/></shape>'
+    light = '<emitter type="constant"><spectrum name="radiance" value="400:1, 700:2"/></emitter>'
+    paint = '<bsdf type="diffuse" id="paint"><rgb name="reflectance" value="0.1, 0.2, 0.3"/></bsdf>'
+    file = scene(f'{group}<shape type="instance"><ref id="group"/>{moved}</shape>{light}{paint}')
+    script = (
+        "import sys\nfrom pathlib import Path\n"
+        "from enfilade.scene.mitsuba.files import check_scene, fingerprint\n"
+        "from enfilade.settings import LimitSettings\n"
+        "check_scene(Path(sys.argv[1]), LimitSettings())\nprint(fingerprint(Path(sys.argv[1])))"
+    )
+    line = [sys.executable, "-c", script, str(file)]
+    done = subprocess.run(line, capture_output=True, text=True, timeout=120, check=False)  # noqa: S603
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == fingerprint(file)
 
 
 @pytest.mark.parametrize("name", ["room", "atrium"])

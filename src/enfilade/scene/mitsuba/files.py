@@ -188,8 +188,9 @@ def _check_numbers(state: Any, node: Any) -> None:
 
 def _check_instance(state: Any, node: Any) -> None:
     """Refuse an instance that holds its shape group: Mitsuba's error does not tell the cause."""
-    nested = [node.props[name] for name in node.props.keys()]  # noqa: SIM118  (not a dictionary)
-    nodes = [state.nodes[one.index()] for one in nested if isinstance(one, mi.Properties.ResolvedReference)]
+    properties = node.props  # of which a transform can't be read before a variant is chosen
+    names = [name for name in properties.keys() if properties.type(name).name == "ResolvedReference"]  # noqa: SIM118
+    nodes = [state.nodes[properties[name].index()] for name in names]
     if any(one.props.plugin_name() == "shapegroup" for one in nodes):
         raise SceneError(
             f"{mi.parser.file_location(state, node)}: an instance holds its shape group: move it to the top "
