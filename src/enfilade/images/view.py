@@ -76,7 +76,7 @@ def open_view(settings: VideoSettings, exposure_ev: float) -> ViewTransform:
 def white_of(settings: VideoSettings) -> float:
     """White of the extended curve of Reinhard et al. 2002 that is nearest to a view's, for neutral colours.
 
-    1 for sRGB, 16 for Blender's AgX; errors as above.
+    1 for sRGB, 8 for Blender's AgX; errors as above.
     """
     luminances = np.exp2(np.arange(-7.0, 7.25, 0.25)).astype(np.float32)
     shown = open_view(settings, 0.0).encode(np.repeat(luminances[None, :, None], 3, axis=2))[0, :, 1]

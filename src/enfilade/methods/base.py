@@ -143,6 +143,8 @@ class Method(ABC):
     needs_lobes : bool
         Whether it needs a renderer that separates diffuse from specular lobes, a
         :class:`~enfilade.renderer.LobeRenderer`.
+    has_tone_curve : bool
+        Whether it judges contrasts by the tone curve of ``[viewing] white``, not by the clipped sRGB curve.
     settings : tuple of type
         Sections that it reads. Runs that differ in other sections only are the same run.
     passes : tuple of Pass
@@ -152,6 +154,7 @@ class Method(ABC):
     name: ClassVar[str]
     revision: ClassVar[int] = 1
     needs_lobes: ClassVar[bool] = False
+    has_tone_curve: ClassVar[bool] = False
     settings: ClassVar[tuple[type[Section], ...]] = ()
     passes: ClassVar[tuple[Pass, ...]]
 

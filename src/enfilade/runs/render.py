@@ -23,7 +23,7 @@ from enfilade.runs.job import Job, read_job, write_job
 from enfilade.runs.ledger import LEDGER_FILE
 from enfilade.runs.scheduler import is_done, passes_of, shortened, work
 from enfilade.runs.statistics import statistics
-from enfilade.settings import DecoupledSettings, LimitSettings, VideoSettings, ViewingSettings
+from enfilade.settings import LimitSettings, VideoSettings, ViewingSettings
 
 SUMMARY_FILE = "summary.json"
 MAX_WHITE_RATIO = 1.5  # of the white of a view and that of the settings
@@ -211,7 +211,7 @@ def _created(job: Job, folder: Path, *, has_preflight: bool) -> RunFolder:
 def _video_notes(job: Job) -> list[str]:
     video = job.settings[VideoSettings]
     notes = [odd_size_note(video.codec, job.path.width, job.path.height)]
-    if DecoupledSettings in job.opened_method().settings:
+    if job.opened_method().has_tone_curve:
         sampled, shown = job.settings[ViewingSettings].white, white_of(video)
         if max(shown / sampled, sampled / shown) > MAX_WHITE_RATIO:
             notes.append(

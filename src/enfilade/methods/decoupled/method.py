@@ -46,6 +46,7 @@ class Decoupled(Method):
     name = "decoupled"
     revision = 41
     needs_lobes = True
+    has_tone_curve = True
     settings = (TraceSettings, ViewingSettings, KeyframeSettings, DecoupledSettings)
     passes = (
         Pass("prepass", IrradianceImage),

@@ -135,11 +135,11 @@ class ImportedScene:
         tables = read_tables(self.folder / SETTINGS_FILE)
         video, viewing = tables.get("video", {}), dict(tables.get("viewing", {}))
         changed = given.get("video", {})
-        if any(changed.get(name, video.get(name)) != video.get(name) for name in ("view", "display", "look")):
+        names = ("ocio", "view", "display", "look")
+        if any(changed.get(name, video.get(name)) != video.get(name) for name in names):
             viewing.pop("white", None)
         if "ocio" in changed:
             video = {}
-            viewing.pop("white", None)
         elif "ocio" in video:
             video = {**video, "ocio": str((self.folder / video["ocio"]).resolve())}
             if given.get("video", {}).get("view", video.get("view")) != video.get("view"):
