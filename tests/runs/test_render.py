@@ -25,7 +25,7 @@ from enfilade.runs.executor import Workers
 from enfilade.runs.folder import RunFolder
 from enfilade.runs.job import Job, read_job
 from enfilade.runs.plan import plan
-from enfilade.runs.render import Shard, prepare, render, render_shard
+from enfilade.runs.render import Shard, _video_notes, prepare, render, render_shard
 from enfilade.scene.opener import Scene
 from enfilade.scene.preflight import Preflight
 from enfilade.settings import (
@@ -35,6 +35,7 @@ from enfilade.settings import (
     Settings,
     TraceSettings,
     VideoSettings,
+    ViewingSettings,
     WarpSettings,
 )
 from support.toy_method import Light, Toy
@@ -385,3 +386,13 @@ def test_frames_that_show_nothing_are_told_of(tmp_path, emitter, black):
         black
     )
     assert [n for n in summary["black_frames"] if n > 1] == black
+
+
+@pytest.mark.parametrize(
+    ("method", "white", "count"), [("decoupled", 1.0, 0), ("decoupled", 8.0, 1), ("paper", 8.0, 0)]
+)
+def test_contrasts_judged_for_another_view_than_the_video_has_are_told(job, method, white, count):
+    settings = job.settings.replace(ViewingSettings, white=white)
+    notes = _video_notes(dataclasses.replace(job, method=method, settings=settings))
+    assert len(notes) == count
+    assert all("--set viewing.white=1 is nearer to it" in note for note in notes)
