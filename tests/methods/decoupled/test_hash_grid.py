@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.stats import sem
 
 from enfilade.arrays import Array3f, Bool, Float, UInt
 from enfilade.kernels.tone import REC709_LUMINANCE
@@ -88,69 +87,86 @@ def test_sizes_do_not_share_entries():
     by_size = {int(keys(0.0 * point, UP, 2.0**k)[0]) for k in range(-29, 40)}
     assert len(by_size) == 69
     points, normals = random_points(500)
-    np.testing.assert_array_equal(keys(points, normals, 0.7, 1), keys(points, normals, 1.4, 0))
+    key = keys(points, normals, 0.7, 1)
+    np.testing.assert_array_equal(key, keys(points, normals, 1.4, 0))
+    assert set(key & np.uint64(127)) == {32}  # 2^0
 
 
 def test_keys_are_spread_evenly():
-    # Neighbouring cells: each bit of the key is set in half of them, and none depends on another.
+    # Neighbouring cells: each bit of the key is set in half of them, and none depends on another. The others
+    # are the exponent of the size.
     cells = np.stack(np.meshgrid(*[np.arange(24.0)] * 3), -1).reshape(-1, 3) + 0.5
     key = keys(cells, np.tile(UP, (len(cells), 1)), 1.0)
-    bits = (key[:, None] >> np.arange(64, dtype=np.uint64)) & np.uint64(1)
-    limit = 5.0 / np.sqrt(len(cells))  # five standard errors of 64 means, and of 2016 correlations
+    bits = (key[:, None] >> np.arange(7, 64, dtype=np.uint64)) & np.uint64(1)
+    limit = 5.0 / np.sqrt(len(cells))  # five standard errors of 57 means, and of 1596 correlations
     assert np.abs(2.0 * bits.mean(axis=0) - 1.0).max() < limit
-    assert np.abs(np.corrcoef(bits.T) - np.eye(64)).max() < limit
+    assert np.abs(np.corrcoef(bits.T) - np.eye(57)).max() < limit
 
 
-def test_lookup_finds_the_mean_of_the_smallest_reliable_entry_or_of_the_largest():
+def test_lookup_finds_the_mean_of_the_smallest_entry_with_enough_samples_without_those_of_smaller_ones():
     points, normals = random_points(4000)
     points[:3500] *= 0.25  # dense
     points[3900:] *= 10.0  # with few samples at every level
     light = np.abs(points) + 3.0 * (np.random.default_rng(1).random((4000, 1)) < 0.1)
-    by_level = [keys(points, normals, 1.2, level) for level in range(LEVELS)]
-    part = Entries.of(by_level, light)
-    whole = Entries.joined([part, part])  # twice, in any order
-    mean = whole.sums / whole.counts[:, None]
-    at = Array3f(points.T.astype(np.float32)), Array3f(normals.T.astype(np.float32)), UInt(1), Float(1.2)
-    found, is_hit = (np.array(v) for v in whole.upload().lookup(*at, Array3f(0.5)))
-    twice = np.tile(light @ REC709_LUMINANCE, 2)
+    width = np.where(np.arange(4000) % 2, 1.2, 0.6).astype(
+        np.float32
+    )  # entries of one are larger ones of the other
+    by_level = [keys(points, normals, width, level) for level in range(LEVELS + 1)]
+    half = len(points) // 2
+    parts = [Entries.of([key[of] for key in by_level], light[of]) for of in (slice(half), slice(half, None))]
+    entries = Entries.joined(parts[::-1])  # in any order
 
-    def samples(level, key):
-        return twice[np.tile(by_level[level] == key, 2)]
+    # Judge the entries from the smallest size up, by all samples that are not in a smaller one.
+    luminance, size = light @ REC709_LUMINANCE, np.log2(width / 0.6).astype(int)
+    chosen, is_left = {}, np.ones(len(points), bool)
+    for now in range(LEVELS + 1):
+        level = now - size
+        is_here = is_left & (level >= 0) & (level < LEVELS)
+        own, above = (np.choose(np.clip(level + k, 0, LEVELS), by_level) for k in (0, 1))
+        for parent in np.unique(above[is_here]):
+            children = [is_here & (own == key) for key in np.unique(own[is_here & (above == parent)])]
+            freedom = max(sum(c.sum() - 1 for c in children), 1)
+            variance = sum(c.sum() * luminance[c].var() for c in children) / freedom
+            mean = luminance[np.any(children, axis=0)].mean()
+            for child in children:
+                if child.sum() >= MIN_SAMPLES and np.sqrt(variance / child.sum()) < MAX_ERROR * mean:
+                    chosen[own[child][0]] = light[child].mean(axis=0)
+                    is_left &= ~child
 
-    def is_usable(own):
-        return len(own) >= MIN_SAMPLES and sem(own) <= MAX_ERROR * own.mean()
-
-    def is_reliable(level, i):
-        if level == LEVELS - 1:
-            return False
-        own, above = by_level[level][i], by_level[level + 1]
-        children = [samples(level, key) for key in np.unique(by_level[level][above == above[i]])]
-        variance = sum(len(c) * c.var() for c in children) / max(sum(len(c) - 1 for c in children), 1)
-        count = len(samples(level, own))
-        error = np.sqrt(variance / count) / samples(level + 1, above[i]).mean()
-        return count >= MIN_SAMPLES and error <= MAX_ERROR
-
+    at = Array3f(points.T.astype(np.float32)), Array3f(normals.T.astype(np.float32)), UInt(1), Float(width)
+    found, is_hit = (np.array(v) for v in entries.upload().lookup(*at, Array3f(0.5)))
     used = []
-    for i in range(0, len(points), 4):
-        best = None
-        for level, key in enumerate(k[i] for k in by_level):
-            reliable = is_reliable(level, i)
-            best = (level, key) if reliable or is_usable(samples(level, key)) else best
-            if reliable:
-                break
-        assert is_hit[i] == (best is not None)
-        if best is not None:
-            np.testing.assert_allclose(found[:, i], mean[whole.keys == best[1]][0], rtol=1e-5)
-        used.append(-1 if best is None else best[0])
+    for i, of_point in enumerate(zip(*by_level[:LEVELS], strict=True)):
+        levels = [level for level, key in enumerate(of_point) if key in chosen]
+        assert is_hit[i] == bool(levels)
+        if levels:
+            np.testing.assert_allclose(found[:, i], chosen[of_point[levels[0]]], rtol=1e-5)
+        used.append(levels[0] if levels else -1)
     assert np.bincount(np.array(used) + 1, minlength=LEVELS + 1).min() > 5
+
+
+def test_samples_light_the_places_where_they_were_found_and_no_others():
+    # A lit place that many paths reach, and dark ones beside it that few reach.
+    noise = np.random.default_rng(2).normal(1.0, 0.1, (203, 1))
+    many, few = np.float32([[0.1, 0.1, 0.1]]), np.float32([[0.6, 0.1, 0.1], [0.1, 0.6, 0.1], [0.6, 0.6, 0.1]])
+    points = np.concatenate([many.repeat(200, axis=0), few, few])
+    light = (
+        noise.repeat(3, axis=1)[[*range(203), 200, 201, 202]] * np.r_[np.ones(200), np.full(6, 0.1)][:, None]
+    )
+    levels = [keys(points, np.tile(UP, (206, 1)), 0.5, level) for level in range(LEVELS + 1)]
+    grid = Entries.of(levels, light).upload()
+    found, is_hit = grid.lookup(Array3f(points.T), Array3f(*UP[0].tolist()), UInt(1), Float(0.5))
+    assert np.array(is_hit).all()
+    np.testing.assert_allclose(np.array(found)[0, 200:], light[200:, 0].mean(), rtol=1e-5)
+    np.testing.assert_allclose(np.array(found)[0].sum(), light[:, 0].sum(), rtol=1e-5)
 
 
 def seen_in_cells(light):
     """Lookups in four neighbouring cells with 64 estimates each, (4, 64), which have one parent."""
     points = np.float32([[x, y, 0.1] for y in (0.1, 0.6) for x in (0.1, 0.6)])
     every = np.repeat(points, light.shape[1], axis=0)
-    levels = [keys(every, np.tile(UP, (len(every), 1)), 0.5, level) for level in range(LEVELS)]
-    assert [len(np.unique(level)) for level in levels] == [4, 1, 1]
+    levels = [keys(every, np.tile(UP, (len(every), 1)), 0.5, level) for level in range(LEVELS + 1)]
+    assert [len(np.unique(level)) for level in levels] == [4, 1, 1, 1]
     grid = Entries.of(levels, light.reshape(-1, 1).repeat(3, axis=1)).upload()
     at = Array3f(points.T), Array3f(*UP[0].tolist()), UInt(1), Float(0.5)
     return np.array(grid.lookup(*at)[0])[0]

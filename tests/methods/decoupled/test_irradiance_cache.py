@@ -1,12 +1,14 @@
-"""Irradiance images as they are uploaded: what is denoised stays as it is."""
+"""Irradiance images: what is denoised stays as it is, and hidden points beside visible ones are not shown."""
+
+from dataclasses import replace
 
 import drjit as dr
 import numpy as np
 import pytest
 
-from enfilade.arrays import image
+from enfilade.arrays import Array3f, UInt, image
 from enfilade.camera.pinhole import Camera, look_at
-from enfilade.methods.decoupled.irradiance_cache import accumulate, reproject_to, upload
+from enfilade.methods.decoupled.irradiance_cache import IrradianceCache, accumulate, reproject_to, upload
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.records import Geometry, Shading
 
@@ -45,3 +47,21 @@ def test_only_variances_that_are_read_are_stored(deviation):
     lanes = [[dr.width(v) for v in of.variances] for of in (uploaded, averaged, reprojected)]
     assert lanes == [[1, H * W if deviation else 1], [1], [1]]
     np.testing.assert_allclose(np.array(reprojected.values[0]), np.array(averaged.values[0]), rtol=0.1)
+
+
+@pytest.mark.parametrize(("min_weight", "reach"), [(0.02, 0.97), (0.5, 0.5), (0.9, 0.1)])
+def test_points_beyond_the_visible_part_of_a_surface_are_found_up_to_the_least_weight(min_weight, reach):
+    # The right half of the wall is hidden; `reach` is in pixels from the centre of the last visible one.
+    geometry, irradiance = wall_with_a_bright_pixel(0.0)
+    irradiance.is_known[:, W // 2 :] = False
+    uploaded = upload(geometry, irradiance)
+    blank = upload(geometry, replace(irradiance, is_known=np.zeros((H, W), bool)))
+    last = W // 2 - 0.5
+    x = last + np.array([-3.0, -0.2, reach - 0.05, reach + 0.05, 2.0])
+    pixels = np.stack([x, np.full(5, 3.5), np.ones(5)])
+    points = geometry.camera.eye[:, None] + geometry.camera.direction_from_pixel @ pixels
+    at = Array3f(points.astype(np.float32)), Array3f(0, 0, 1), UInt(1)
+    cache = IrradianceCache.of([uploaded, blank], [1.0, 1.0], view=uploaded, min_weight=min_weight)
+    for found, is_found in (cache.lookup(*at), cache.lookup_in_view(*at)):
+        assert np.array(is_found).tolist() == [True, True, True, False, False]
+        np.testing.assert_allclose(np.array(found)[0], [1, 1, 1, 0, 0], rtol=1e-5)

@@ -8,8 +8,9 @@ whose keys are hashes of the quantized position and normal (Binder et al. 2018) 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import drjit as dr
@@ -19,9 +20,11 @@ import numpy.typing as npt
 from enfilade.arrays import Array3f, Bool, Float, Int, UInt, UInt64, lanes, opaque
 from enfilade.kernels.tone import REC709_LUMINANCE
 
-LEVELS = 3  # sizes in which each estimate is kept: its own, twice and four times that
+LEVELS = 3  # sizes in which points are looked up: that of their path, twice and four times that
 MIN_SAMPLES, MAX_ERROR = 4, 0.5  # fewest, and largest relative standard error, of an entry that is used
 NO_PARENT = np.uint64(0)
+SIZE_BITS, SIZE_OFFSET = 127, 32  # of a key: the exponent of the entry's size, plus the offset
+MIN_WIDTH, MAX_WIDTH = 1e-9, 2.0**90  # of paths, scene units: exponents that these bits can hold
 MAX_ENTRIES = 1 << 22  # that are uploaded; of more, those with the most samples
 SEARCH_STEPS = (16, 8, 4, 2, 1)  # of a binary search in a bucket: up to 31 keys; the mean is at most one
 QUANTUM = 2.0**-30  # of estimates after exposure: sums up to 2^23 are exact in the 53 bits of a float64
@@ -37,8 +40,6 @@ class HashGrid:
         Rising.
     irradiance : Array3f
         Irradiance over pi.
-    is_reliable : Bool
-        Whether the entry is preferred to larger ones.
     last : UInt
         Lane of the last key.
     starts : UInt
@@ -50,7 +51,6 @@ class HashGrid:
 
     keys: Any
     irradiance: Any
-    is_reliable: Any
     last: Any
     starts: Any
     shift: Any
@@ -58,7 +58,7 @@ class HashGrid:
     def lookup(
         self, position: Any, normal: Any, shape_index: Any, width: Any, offset: Any = None, where: Any = True
     ) -> tuple[Any, Any]:
-        """Irradiance over pi at points, from the smallest reliable entry, or else the largest.
+        """Irradiance over pi at points, from the smallest entry.
 
         Parameters
         ----------
@@ -77,19 +77,16 @@ class HashGrid:
         irradiance : Array3f
         is_found : Bool
         """
-        irradiance, is_found, is_final = Array3f(0), Bool(False), ~Bool(where)
+        irradiance, is_found = Array3f(0), Bool(False)
         offsets = (0.5,) if offset is None else (offset, 0.5)
         for level in range(LEVELS):
-            is_open = ~is_final
             for moved in offsets:
                 key = entry_key(position, normal, shape_index, width, level, moved)
-                lane, is_here = self._search(key, is_open)
+                lane, is_here = self._search(key, Bool(where) & ~is_found)
                 irradiance = dr.select(
                     is_here, dr.gather(Array3f, self.irradiance, lane, is_here), irradiance
                 )
-                is_final |= is_here & dr.gather(Bool, self.is_reliable, lane, is_here)
                 is_found |= is_here
-                is_open &= ~is_here
         return irradiance, is_found
 
     def _search(self, key: Any, is_active: Any) -> tuple[Any, Any]:
@@ -105,9 +102,10 @@ class HashGrid:
 def entry_key(position: Any, normal: Any, shape_index: Any, width: Any, level: int, offset: Any = 0.5) -> Any:
     """Key of the entry of a point; UInt64.
 
-    A 64-bit hash of the shape index, the size, the three coordinates of the cell (32 bits each) and the axis
-    nearest to the normal. Two entries share a key with a probability of 2^-64. Among 4 million entries the
-    probability of any collision is 5e-7; that of a lookup that finds a wrong entry is 2e-13.
+    57 bits of a hash of the shape index, the size, the three coordinates of the cell (32 bits each) and the
+    axis nearest to the normal; the lowest seven bits are the exponent of the size. Two entries of a size
+    share a key with a probability of 2^-57. Among 4 million entries the probability of any collision is
+    6e-5; that of a lookup that finds a wrong entry is 3e-11.
 
     Parameters
     ----------
@@ -121,7 +119,7 @@ def entry_key(position: Any, normal: Any, shape_index: Any, width: Any, level: i
         See :meth:`HashGrid.lookup`.
     """
     # Quantize the position.
-    exponent = Int(dr.floor(dr.log2(dr.maximum(width, 1e-9)))) + level
+    exponent = Int(dr.floor(dr.log2(dr.clip(width, MIN_WIDTH, MAX_WIDTH)))) + level
     size = dr.exp2(Float(exponent))
     cell = Array3f(position) / size + (offset - 0.5)
 
@@ -129,7 +127,8 @@ def entry_key(position: Any, normal: Any, shape_index: Any, width: Any, level: i
     x, y, z = (UInt(Int(dr.floor(coordinate))) for coordinate in cell)
     key = _splitmix64(_packed(shape_index, UInt(exponent << 3) | _nearest_axis(normal)))
     key = _splitmix64(key ^ _packed(x, y))
-    return _splitmix64(key ^ UInt64(z))
+    key = _splitmix64(key ^ UInt64(z))
+    return (key & UInt64(2**64 - 1 - SIZE_BITS)) | UInt64(exponent + SIZE_OFFSET)
 
 
 def _packed(high: Any, low: Any) -> Any:
@@ -156,7 +155,7 @@ def _nearest_axis(normal: Any) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Entries:
-    """Sums of estimates of irradiance over pi, by entry.
+    """Sums of estimates of irradiance over pi, by entry of the size that the estimates' paths have.
 
     Attributes
     ----------
@@ -167,8 +166,9 @@ class Entries:
         Sums of squared luminance.
     counts : (N,) int64 or float64
         The latter where estimates have a weight.
-    parents : (N,) uint64
-        Keys of the entries of twice the size; 0 where no estimate was kept in it.
+    parents : (N, LEVELS) uint64
+        Keys of the larger entries around each, each of twice the size of the one before; 0 where it is not
+        known. Points are not looked up in the last one.
     """
 
     keys: npt.NDArray[np.uint64]
@@ -184,14 +184,14 @@ class Entries:
         *,
         unit: float = 1.0,
     ) -> Entries:
-        """Sum up estimates in entries of rising size; those that are not finite are left out.
+        """Sum up estimates in entries; those that are not finite are left out.
 
         They are rounded to :data:`QUANTUM`, so that sums are exact and independent of the order.
 
         Parameters
         ----------
         levels : sequence of (N,) uint64
-            Keys of each estimate, one a level.
+            Keys of each estimate: of the entry of its own size, and of larger ones, up to ``1 + LEVELS``.
         irradiance : (N, 3)
             Over pi.
         unit
@@ -207,11 +207,11 @@ class Entries:
                 (np.square(light @ REC709_LUMINANCE), QUANTUM * unit**2),
             )
         )
-        ones, keys = np.ones(len(light), np.int64), [level[is_finite] for level in levels]
-        parents = [*keys[1:], np.full(len(light), NO_PARENT)]
-        return Entries.joined(
-            [Entries(key, light, squares, ones, above) for key, above in zip(keys, parents, strict=True)]
-        )
+        keys, *parents = (level[is_finite] for level in levels)
+        above = np.full((len(light), LEVELS), NO_PARENT)
+        for column, key in enumerate(parents):
+            above[:, column] = key
+        return Entries.joined([Entries(keys, light, squares, np.ones(len(light), np.int64), above)])
 
     def weighted(self, weight: float) -> Entries:
         """The entries as if each estimate had been made so often; a fraction of few bits keeps sums exact."""
@@ -223,71 +223,105 @@ class Entries:
     @staticmethod
     def joined(parts: Sequence[Entries]) -> Entries:
         """Sum up several lists of entries; of none, the empty list."""
-        empty = np.zeros(0, np.uint64)
-        parts = [Entries(empty, np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64), empty), *parts]
-        keys, place = np.unique(np.concatenate([part.keys for part in parts]), return_inverse=True)
-        sums, squares, counts, above = (
+        empty, above = np.zeros(0, np.uint64), np.zeros((0, LEVELS), np.uint64)
+        parts = [Entries(empty, np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64), above), *parts]
+        keys, first, place = np.unique(
+            np.concatenate([part.keys for part in parts]), return_index=True, return_inverse=True
+        )
+        sums, squares, counts, parents = (
             np.concatenate([getattr(part, name) for part in parts])
             for name in ("sums", "squares", "counts", "parents")
         )
         totals: Any = [np.bincount(place, v, len(keys)) for v in (*sums.T, squares, counts)]
-        parents, has_parent = np.full(len(keys), NO_PARENT), above != NO_PARENT
-        parents[place[has_parent]] = above[has_parent]
-        return Entries(keys, np.stack(totals[:3], axis=1), totals[3], totals[4].astype(counts.dtype), parents)
+        return Entries(
+            keys, np.stack(totals[:3], axis=1), totals[3], totals[4].astype(counts.dtype), parents[first]
+        )
 
     def upload(self) -> HashGrid | None:
         """Upload the entries with enough samples; None if there are none."""
-        # Choose the entries that no single path dominates, but for those without light: a few paths miss rare
-        # light by chance, and entries that have found it are often left out.
-        count = np.maximum(self.counts, 2)
-        irradiance = self.sums / count[:, None]
-        mean = irradiance @ REC709_LUMINANCE
-        deviation = np.maximum(self.squares - count * np.square(mean), 0.0)  # sum of squared deviations
-        error = np.sqrt(deviation / (count * (count - 1))) / np.maximum(mean, np.finfo(float).tiny)
-        is_reliable = self._are_reliable(mean, deviation)
-        chosen = np.flatnonzero(
-            is_reliable | ((self.counts >= MIN_SAMPLES) & (error <= MAX_ERROR) & (mean > 0.0))
-        )
-        if not len(chosen):
+        keys, irradiance, counts = self._chosen()
+        if not len(keys):
             return None
-        if len(chosen) > MAX_ENTRIES:
-            chosen = np.sort(chosen[np.argsort(-self.counts[chosen], kind="stable")[:MAX_ENTRIES]])
-        irradiance, is_reliable = irradiance[chosen], is_reliable[chosen]
-        shift = 64 - max(math.ceil(math.log2(len(chosen))), 1)
-        buckets = (self.keys[chosen] >> np.uint64(shift)).astype(np.int64)
+        if len(keys) > MAX_ENTRIES:
+            most = np.argsort(-counts, kind="stable")[:MAX_ENTRIES]
+            keys, irradiance = keys[most], irradiance[most]
+        order = np.argsort(keys)
+        keys, irradiance = keys[order], irradiance[order]
+        shift = 64 - max(math.ceil(math.log2(len(keys))), 1)
+        buckets = (keys >> np.uint64(shift)).astype(np.int64)
         sizes = np.bincount(buckets, minlength=1 << (64 - shift))
         grid = HashGrid(
-            lanes(self.keys[chosen]),
+            lanes(keys),
             lanes(irradiance.astype(np.float32)[None]),
-            lanes(is_reliable),
-            opaque(len(chosen) - 1, UInt),
+            opaque(len(keys) - 1, UInt),
             lanes((np.cumsum(sizes) - sizes).astype(np.uint32)),
             opaque(shift, UInt64),
         )
         dr.eval(grid)
         return grid
 
-    def _are_reliable(
-        self, mean: npt.NDArray[np.float64], deviation: npt.NDArray[np.float64]
-    ) -> npt.NDArray[np.bool_]:
-        """Entries that are preferred to their parents, (N,).
+    def _chosen(self) -> tuple[npt.NDArray[np.uint64], npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """Keys, irradiance (N, 3) and numbers of samples of the entries that are looked up.
 
-        Their own values decide nothing: if lit entries were preferred and dark ones were not, dark surfaces
-        would have the mean of both, and the scene more light than it has. The variance of an estimate is
-        that of all children of a parent together, each about its own mean, and its error is relative to the
-        light of the parent.
+        Entries are judged from the smallest size up, and the samples of a chosen one are left out of larger
+        ones. Each sample thus counts where paths end that find no smaller entry, as it did itself. If the
+        larger ones were means of all samples, places that few paths reach would have the light of those that
+        many reach.
 
-        Parameters
-        ----------
-        mean, deviation : (N,) float64
-            Mean luminance of each entry, and the sum of squared deviations from it.
+        What an entry happens to have found decides nothing: if lit entries were preferred and dark ones were
+        not, the scene would have more light than it has. The variance of an estimate is that of all entries
+        in the next larger one together, each about its own mean, and its error is relative to their light.
+        Where none has found any, all are too few: rare light is missed by chance.
         """
-        found = np.minimum(np.searchsorted(self.keys, self.parents), max(len(self.keys) - 1, 0))
-        has_parent = (self.parents != NO_PARENT) & (self.keys[found] == self.parents)
-        child, parent = np.flatnonzero(has_parent), found[has_parent]
-        freedom = np.bincount(parent, np.maximum(self.counts[child] - 1, 0), len(self.keys))
-        pooled = np.bincount(parent, deviation[child], len(self.keys)) / np.maximum(freedom, 1.0)
-        is_reliable = np.zeros(len(self.keys), np.bool_)
-        error, counts = np.sqrt(pooled[parent] / self.counts[child]), self.counts[child]
-        is_reliable[child] = (counts >= MIN_SAMPLES) & (error <= MAX_ERROR * mean[parent])
-        return is_reliable
+        nodes, chain = np.unique(np.column_stack([self.keys, self.parents]), return_inverse=True)
+        chain = chain.reshape(len(self.keys), 1 + LEVELS)
+        values = np.column_stack([self.sums, self.squares, self.counts])
+        is_left = np.ones(len(self.keys), np.bool_)  # smallest entries that no chosen one contains
+        keys, means, samples = [np.zeros(0, np.uint64)], [np.zeros((0, 3))], [np.zeros(0)]
+        for row, column in _by_size(nodes, chain):
+            # Sum up what is left in each entry of this size.
+            smallest, level = row[is_left[row]], column[is_left[row]]
+            entries, of = np.unique(chain[smallest, level], return_inverse=True)
+            *sums, squares, counts = (np.bincount(of, v, len(entries)) for v in values[smallest].T)
+            irradiance = np.stack(sums, axis=1) / counts[:, None]
+            mean = irradiance @ REC709_LUMINANCE
+            deviations = np.maximum(squares - counts * np.square(mean), 0.0)  # sums of their squares
+
+            # Judge it together with the others in the next larger entry.
+            above = np.zeros(len(entries), np.int64)
+            above[of] = chain[smallest, level + 1]
+            is_alone = nodes[above] == NO_PARENT
+            above[is_alone] = len(nodes) + np.flatnonzero(is_alone)
+            _, group = np.unique(above, return_inverse=True)
+            freedom = np.maximum(np.bincount(group, counts - 1.0), 1.0)
+            variance = (np.bincount(group, deviations) / freedom)[group]
+            light = (np.bincount(group, counts * mean) / np.bincount(group, counts))[group]
+            is_chosen = (counts >= MIN_SAMPLES) & (np.sqrt(variance / counts) < MAX_ERROR * light)
+
+            is_left[smallest] = ~is_chosen[of]
+            keys.append(nodes[entries[is_chosen]])
+            means.append(irradiance[is_chosen])
+            samples.append(counts[is_chosen].astype(np.float64))
+        return np.concatenate(keys), np.concatenate(means), np.concatenate(samples)
+
+
+def _by_size(
+    nodes: npt.NDArray[np.uint64], chain: npt.NDArray[np.intp]
+) -> Iterator[tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]]:
+    """Rows and columns of a list of chains of entries, together for entries of each size, from the smallest.
+
+    Parameters
+    ----------
+    nodes : (M,) uint64
+        Keys of all entries.
+    chain : (N, 1 + LEVELS)
+        Indices of nodes, each of twice the size of the one before. The last column is left out.
+    """
+    row, column = np.nonzero(nodes[chain[:, :LEVELS]] != NO_PARENT)
+    sizes = (nodes[chain[row, column]] & np.uint64(SIZE_BITS)).astype(np.intp)
+    order = np.argsort(sizes, kind="stable")
+    ends = np.cumsum(np.bincount(sizes))
+    for first, last in pairwise([0, *ends]):
+        if first < last:
+            part = order[first:last]
+            yield row[part], column[part]

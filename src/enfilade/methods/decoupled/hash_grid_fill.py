@@ -19,7 +19,7 @@ from enfilade.renderer import PixelFilter, Purpose
 
 SPECULAR_SPP = 4  # specular rays of each pixel of the light camera
 SEEN_SPP = 4  # camera rays of each pixel of the light camera
-GATHER_SPP = 1  # final gather rays of each diffuse pixel of the prepass image
+GATHER_SPP = 4  # final gather rays of each diffuse pixel of the prepass image
 
 
 def fill_hash_grid(shot: ShotContext, frame: int) -> Output:

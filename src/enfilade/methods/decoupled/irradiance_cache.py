@@ -47,6 +47,8 @@ class IrradianceCache:
         Whether the images are without next-event estimates of emitters that cast sharp shadows.
     path_guide : PathGuide or None
         Of paths that estimate irradiance.
+    min_weight : float
+        Weight of the pixels around a point, at most about one, above which an image shows it.
     """
 
     view: UploadedImage | None = None
@@ -55,6 +57,7 @@ class IrradianceCache:
     hash_grid: HashGrid | None = None
     soft_only: bool = False
     path_guide: PathGuide | None = None
+    min_weight: float = MIN_FOUND_WEIGHT
 
     @staticmethod
     def of(
@@ -65,16 +68,17 @@ class IrradianceCache:
         view: UploadedImage | None = None,
         soft_only: bool = False,
         path_guide: PathGuide | None = None,
+        min_weight: float = MIN_FOUND_WEIGHT,
     ) -> IrradianceCache:
         """A cache of some images with their weights."""
         own = tuple(opaque(float(weight)) for weight in weights)
-        return IrradianceCache(view, tuple(images), own, hash_grid, soft_only, path_guide)
+        return IrradianceCache(view, tuple(images), own, hash_grid, soft_only, path_guide, min_weight)
 
     def lookup_in_view(self, position: Any, normal: Any, shape_index: Any) -> tuple[Any, Any]:
         """The same as :meth:`lookup`, from the image in the view of the camera."""
         if self.view is None:
             return Array3f(0), Bool(False)
-        return _mean([(self.view, Float(1))], position, normal, shape_index)
+        return _mean([(self.view, Float(1))], position, normal, shape_index, self.min_weight)
 
     def lookup(self, position: Any, normal: Any, shape_index: Any) -> tuple[Any, Any]:
         """Irradiance over pi at points, from the images.
@@ -90,21 +94,26 @@ class IrradianceCache:
             0 where none is found.
         is_found : Bool
         """
-        return _mean(zip(self.images, self.weights, strict=True), position, normal, shape_index)
+        return _mean(
+            zip(self.images, self.weights, strict=True), position, normal, shape_index, self.min_weight
+        )
 
 
 def _mean(
-    images: Iterable[tuple[UploadedImage, Any]], position: Any, normal: Any, shape_index: Any
+    images: Iterable[tuple[UploadedImage, Any]],
+    position: Any,
+    normal: Any,
+    shape_index: Any,
+    min_weight: float,
 ) -> tuple[Any, Any]:
     """Weighted mean of images at points (Array3f), and whether any shows them (Bool)."""
     total, weight = Array3f(0), Float(0)
-    valid = Float(0)
     for one, own in images:
         found = lookup(position, normal, shape_index, one, margin=GAUSSIAN_RADIUS_PX)
-        total += own * sum(found.totals, Array3f(0))
-        weight += own * found.weight
-        valid += dr.select(own > 0.0, found.weight, 0.0)
-    is_found = valid > MIN_FOUND_WEIGHT
+        its_weight = dr.select(found.weight > min_weight, own, 0.0)
+        total += its_weight * sum(found.totals, Array3f(0))
+        weight += its_weight * found.weight
+    is_found = weight > 0.0
     return dr.select(is_found, total / weight, 0.0), is_found
 
 

@@ -267,9 +267,9 @@ def _surviving(path: Path, point: ShadingPoint) -> Any:
 
 
 def _keys(point: ShadingPoint, path: Path) -> tuple[Any, ...]:
-    """Keys of the entries of a point, one a level."""
+    """Keys of the entries of a point: one a level, and the one above."""
     at = point.position, point.surfaces.normal, point.surfaces.shape_index, path.width_at(point)
-    return tuple(entry_key(*at, level) for level in range(LEVELS))
+    return tuple(entry_key(*at, level) for level in range(LEVELS + 1))
 
 
 def _aov_lane(path: Path, point: ShadingPoint, sample: BsdfSample, transmitted_at: Any) -> Any:

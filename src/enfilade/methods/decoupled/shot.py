@@ -37,6 +37,7 @@ HASH_GRID_KEYFRAMES = 8  # nearest ones whose entries are looked up
 FADE = 0.25  # of the distance of the next keyframe, over which entries fade
 FADE_STEPS = 4  # of their weight: each uploads the hash grid again
 MIN_WEIGHT = 1e-3  # of an image, which then counts only where no other shows the surface
+PREPASS_WEIGHT = 0.9  # least of the pixels around a point: hidden points beside visible ones are not found
 
 
 class ShotContext:
@@ -166,7 +167,12 @@ class ShotContext:
         near = nearest(self.walk.path, self.keyframes, frame, PREPASS_IMAGES)
         images = [self.images.accumulated_prepass(keyframe) for keyframe in near]
         filled_up = self._filled_up(images, [1.0] * len(images), PREPASS_IMAGES)
-        return IrradianceCache.of(*filled_up, view=images[0], path_guide=self._path_guide(near[0]))
+        return IrradianceCache.of(
+            *filled_up,
+            view=images[0],
+            path_guide=self._path_guide(near[0]),
+            min_weight=PREPASS_WEIGHT,
+        )
 
     def final_gather_cache(self, frame: int) -> IrradianceCache:
         """Prepass images and hash grid near a frame, for final gathering."""
