@@ -13,6 +13,7 @@ from enfilade.methods.decoupled.hash_grid import (
     Entries,
     entry_key,
 )
+from enfilade.methods.decoupled.hash_grid_fill import gather_spp
 
 UP = np.float32([[0.0, 0.0, 1.0]])
 
@@ -265,3 +266,10 @@ def test_lanes_that_are_not_looked_up_find_nothing():
     light, is_hit = (np.array(v) for v in grid.lookup(*at, where=Bool([True, False])))
     assert is_hit.tolist() == [True, False]
     np.testing.assert_array_equal(light, [[1.0, 0.0]] * 3)
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "spp"), [(64, 36, 4), (320, 180, 4), (480, 270, 2), (640, 360, 1), (960, 540, 1)]
+)
+def test_larger_frames_have_as_many_gather_rays_and_no_pixel_has_none(width, height, spp):
+    assert gather_spp(width * height) == spp

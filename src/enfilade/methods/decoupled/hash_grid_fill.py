@@ -10,7 +10,7 @@ import numpy.typing as npt
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.hash_grid import Entries
 from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
-from enfilade.methods.decoupled.light_camera import light_camera
+from enfilade.methods.decoupled.light_camera import LIGHT_PIXELS, light_camera
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.virtual_images import IMAGING
 from enfilade.methods.decoupled.virtual_irradiance import trace_virtual_images
@@ -19,7 +19,15 @@ from enfilade.renderer import PixelFilter, Purpose
 
 SPECULAR_SPP = 4  # specular rays of each pixel of the light camera
 SEEN_SPP = 4  # camera rays of each pixel of the light camera
-GATHER_SPP = 4  # final gather rays of each diffuse pixel of the prepass image
+MAX_GATHER_SPP = 4  # final gather rays of each diffuse pixel of the prepass image, fewer in larger ones
+
+
+def gather_spp(pixels: int) -> int:
+    """Final gather rays of a pixel of a prepass image with so many pixels.
+
+    What is uncertain in the hash grid is the light of whole surfaces: it depends on the number of all rays.
+    """
+    return min(max(round(LIGHT_PIXELS / pixels), 1), MAX_GATHER_SPP)
 
 
 def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
@@ -72,7 +80,7 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
         lambda rays, sampler: shot.integrator.final_gather(cache, shot.spawn(frame, rays, sampler), collect),
         walk.random(frame, Purpose.PREPASS_HASH_GRID),
     )
-    gathered.add(GATHER_SPP)
+    gathered.add(gather_spp(camera.width * camera.height))
 
     # Sum up the estimates by entry.
     entries = Entries.joined([*parts, virtual])
