@@ -8,9 +8,8 @@ whose keys are hashes of the quantized position and normal (Binder et al. 2018) 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 import drjit as dr
@@ -273,55 +272,34 @@ class Entries:
         in the next larger one together, each about its own mean, and its error is relative to their light.
         Where none has found any, all are too few: rare light is missed by chance.
         """
-        nodes, chain = np.unique(np.column_stack([self.keys, self.parents]), return_inverse=True)
-        chain = chain.reshape(len(self.keys), 1 + LEVELS)
+        # List each smallest entry at every level, with the key of the next larger one.
+        chain = np.column_stack([self.keys, self.parents])
+        row, level = np.nonzero(chain[:, :LEVELS] != NO_PARENT)
+        own, above = chain[row, level], chain[row, level + 1]
+        above = np.where(above != NO_PARENT, above, own)
+        size = (own & np.uint64(SIZE_BITS)).astype(np.uint8)
+
         values = np.column_stack([self.sums, self.squares, self.counts])
         is_left = np.ones(len(self.keys), np.bool_)  # smallest entries that no chosen one contains
         keys, means, samples = [np.zeros(0, np.uint64)], [np.zeros((0, 3))], [np.zeros(0)]
-        for row, column in _by_size(nodes, chain):
+        for one in np.unique(size):
             # Sum up what is left in each entry of this size.
-            smallest, level = row[is_left[row]], column[is_left[row]]
-            entries, of = np.unique(chain[smallest, level], return_inverse=True)
-            *sums, squares, counts = (np.bincount(of, v, len(entries)) for v in values[smallest].T)
+            left = np.flatnonzero((size == one) & is_left[row])
+            entries, first, place = np.unique(own[left], return_index=True, return_inverse=True)
+            *sums, squares, counts = (np.bincount(place, of, len(entries)) for of in values[row[left]].T)
             irradiance = np.stack(sums, axis=1) / counts[:, None]
             mean = irradiance @ REC709_LUMINANCE
-            deviations = np.maximum(squares - counts * np.square(mean), 0.0)  # sums of their squares
+            deviation = np.maximum(squares - counts * np.square(mean), 0.0)  # sum of squared deviations
 
             # Judge it together with the others in the next larger entry.
-            above = np.zeros(len(entries), np.int64)
-            above[of] = chain[smallest, level + 1]
-            is_alone = nodes[above] == NO_PARENT
-            above[is_alone] = len(nodes) + np.flatnonzero(is_alone)
-            _, group = np.unique(above, return_inverse=True)
-            freedom = np.maximum(np.bincount(group, counts - 1.0), 1.0)
-            variance = (np.bincount(group, deviations) / freedom)[group]
+            _, group = np.unique(above[left[first]], return_inverse=True)
+            freedom = np.maximum(np.bincount(group, np.maximum(counts - 1.0, 0.0)), 1.0)
+            variance = (np.bincount(group, deviation) / freedom)[group]
             light = (np.bincount(group, counts * mean) / np.bincount(group, counts))[group]
             is_chosen = (counts >= MIN_SAMPLES) & (np.sqrt(variance / counts) < MAX_ERROR * light)
 
-            is_left[smallest] = ~is_chosen[of]
-            keys.append(nodes[entries[is_chosen]])
+            is_left[row[left]] = ~is_chosen[place]
+            keys.append(entries[is_chosen])
             means.append(irradiance[is_chosen])
             samples.append(counts[is_chosen].astype(np.float64))
         return np.concatenate(keys), np.concatenate(means), np.concatenate(samples)
-
-
-def _by_size(
-    nodes: npt.NDArray[np.uint64], chain: npt.NDArray[np.intp]
-) -> Iterator[tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]]:
-    """Rows and columns of a list of chains of entries, together for entries of each size, from the smallest.
-
-    Parameters
-    ----------
-    nodes : (M,) uint64
-        Keys of all entries.
-    chain : (N, 1 + LEVELS)
-        Indices of nodes, each of twice the size of the one before. The last column is left out.
-    """
-    row, column = np.nonzero(nodes[chain[:, :LEVELS]] != NO_PARENT)
-    sizes = (nodes[chain[row, column]] & np.uint64(SIZE_BITS)).astype(np.intp)
-    order = np.argsort(sizes, kind="stable")
-    ends = np.cumsum(np.bincount(sizes))
-    for first, last in pairwise([0, *ends]):
-        if first < last:
-            part = order[first:last]
-            yield row[part], column[part]
