@@ -39,6 +39,7 @@ class Purpose(IntEnum):
     GUIDE_SECOND_HALF = 16
     SEEN_HASH_GRID = 17
     GUIDING = 18
+    DEPTHS = 19
 
 
 @dataclass(frozen=True)
@@ -358,7 +359,13 @@ class LobeRenderer(Renderer, Protocol):
         ...
 
     def estimate_diffuse(
-        self, point: ShadingPoint, sampler: Any, path_depth: int = 1, guide: Any = None
+        self,
+        point: ShadingPoint,
+        sampler: Any,
+        path_depth: int = 1,
+        guide: Any = None,
+        *,
+        limited_as: int | None = None,
     ) -> tuple[Any, Any]:
         """Estimate the radiance reflected by the diffuse lobe, divided by the albedo, with one path.
 
@@ -373,6 +380,8 @@ class LobeRenderer(Renderer, Protocol):
             limits the length of paths.
         guide : PathGuide or None
             Of the sampled direction.
+        limited_as
+            End paths from ``path_depth`` 1 as those that begin at this depth, and otherwise alike.
 
         Returns
         -------

@@ -5,14 +5,9 @@ import pytest
 
 from enfilade.arrays import Array3f, Bool, Float, UInt
 from enfilade.kernels.tone import REC709_LUMINANCE
-from enfilade.methods.decoupled import hash_grid as module
-from enfilade.methods.decoupled.hash_grid import (
-    LEVELS,
-    MAX_ERROR,
-    MIN_SAMPLES,
-    Entries,
-    entry_key,
-)
+from enfilade.methods.decoupled import hash_grid_entries as module
+from enfilade.methods.decoupled.hash_grid import LEVELS, SIZE_MASK, entry_key
+from enfilade.methods.decoupled.hash_grid_entries import MAX_ERROR, MIN_SAMPLES, Entries
 from enfilade.methods.decoupled.hash_grid_fill import gather_spp
 
 UP = np.float32([[0.0, 0.0, 1.0]])
@@ -21,6 +16,15 @@ UP = np.float32([[0.0, 0.0, 1.0]])
 def keys(points, normals, width, level=0, shape_index=1):
     points, normals = np.asarray(points, np.float32).T, np.asarray(normals, np.float32).T
     return np.array(entry_key(Array3f(points), Array3f(normals), UInt(shape_index), Float(width), level))
+
+
+def keys_of_levels(points, normals, width):
+    return [keys(points, normals, width, level) for level in range(LEVELS + 1)]
+
+
+def entries_of(key, light):
+    """Entries of keys, with larger ones of which nothing but the size is known."""
+    return Entries.of([key + np.uint64(level) for level in range(LEVELS + 1)], light)
 
 
 def random_points(count, seed=0):
@@ -51,7 +55,7 @@ def test_keys_are_one_to_one_with_cells_and_directions(width, size):
 def grid_at(point, width, shape_index=1, light=1.0):
     """An uploaded entry at one point."""
     key = keys([point], UP, width, shape_index=shape_index)
-    return Entries.of([np.repeat(key, MIN_SAMPLES)], np.full((MIN_SAMPLES, 3), light)).upload()
+    return entries_of(np.repeat(key, MIN_SAMPLES), np.full((MIN_SAMPLES, 3), light)).upload()
 
 
 def is_found(grid, points, width, shape_index=1):
@@ -90,7 +94,7 @@ def test_sizes_do_not_share_entries():
     points, normals = random_points(500)
     key = keys(points, normals, 0.7, 1)
     np.testing.assert_array_equal(key, keys(points, normals, 1.4, 0))
-    assert set(key & np.uint64(127)) == {32}  # 2^0
+    assert set(key & np.uint64(SIZE_MASK)) == {32}  # 2^0
 
 
 def test_keys_are_spread_evenly():
@@ -109,10 +113,9 @@ def test_lookup_finds_the_mean_of_the_smallest_entry_with_enough_samples_without
     points[:3500] *= 0.25  # dense
     points[3900:] *= 10.0  # with few samples at every level
     light = np.abs(points) + 3.0 * (np.random.default_rng(1).random((4000, 1)) < 0.1)
-    width = np.where(np.arange(4000) % 2, 1.2, 0.6).astype(
-        np.float32
-    )  # entries of one are larger ones of the other
-    by_level = [keys(points, normals, width, level) for level in range(LEVELS + 1)]
+    # Entries of one width are larger ones of the other.
+    width = np.where(np.arange(4000) % 2, 1.2, 0.6).astype(np.float32)
+    by_level = keys_of_levels(points, normals, width)
     half = len(points) // 2
     parts = [Entries.of([key[of] for key in by_level], light[of]) for of in (slice(half), slice(half, None))]
     entries = Entries.joined(parts[::-1])  # in any order
@@ -146,27 +149,25 @@ def test_lookup_finds_the_mean_of_the_smallest_entry_with_enough_samples_without
     assert np.bincount(np.array(used) + 1, minlength=LEVELS + 1).min() > 5
 
 
-def test_samples_light_the_places_where_they_were_found_and_no_others():
-    # A lit place that many paths reach, and dark ones beside it that few reach.
-    noise = np.random.default_rng(2).normal(1.0, 0.1, (203, 1))
-    many, few = np.float32([[0.1, 0.1, 0.1]]), np.float32([[0.6, 0.1, 0.1], [0.1, 0.6, 0.1], [0.6, 0.6, 0.1]])
-    points = np.concatenate([many.repeat(200, axis=0), few, few])
-    light = (
-        noise.repeat(3, axis=1)[[*range(203), 200, 201, 202]] * np.r_[np.ones(200), np.full(6, 0.1)][:, None]
-    )
-    levels = [keys(points, np.tile(UP, (206, 1)), 0.5, level) for level in range(LEVELS + 1)]
-    grid = Entries.of(levels, light).upload()
-    found, is_hit = grid.lookup(Array3f(points.T), Array3f(*UP[0].tolist()), UInt(1), Float(0.5))
-    assert np.array(is_hit).all()
-    np.testing.assert_allclose(np.array(found)[0, 200:], light[200:, 0].mean(), rtol=1e-5)
-    np.testing.assert_allclose(np.array(found)[0].sum(), light[:, 0].sum(), rtol=1e-5)
+def test_lookups_that_are_distributed_as_the_samples_find_as_much_light():
+    # Of two widths; nine tenths of the points in one corner, which is ten times as bright.
+    points, normals = random_points(4000)
+    points[:3600] *= 0.1
+    light = np.random.default_rng(2).uniform(0.8, 1.2, (4000, 1)).repeat(3, axis=1)
+    light[:3600] *= 10.0
+    width = np.where(np.arange(4000) % 3, 0.6, 2.5).astype(np.float32)
+    grid = Entries.of(keys_of_levels(points, normals, width), light).upload()
+    position, normal = (Array3f(of.T.astype(np.float32)) for of in (points, normals))
+    found, is_hit = (np.array(of) for of in grid.lookup(position, normal, UInt(1), Float(width)))
+    assert 0.1 < is_hit[3600:].mean() < 1.0
+    np.testing.assert_allclose(found[0].sum(), light[is_hit, 0].sum(), rtol=1e-5)
 
 
 def seen_in_cells(light):
     """Lookups in four neighbouring cells with 64 estimates each, (4, 64), which have one parent."""
     points = np.float32([[x, y, 0.1] for y in (0.1, 0.6) for x in (0.1, 0.6)])
     every = np.repeat(points, light.shape[1], axis=0)
-    levels = [keys(every, np.tile(UP, (len(every), 1)), 0.5, level) for level in range(LEVELS + 1)]
+    levels = keys_of_levels(every, np.tile(UP, (len(every), 1)), 0.5)
     assert [len(np.unique(level)) for level in levels] == [4, 1, 1, 1]
     grid = Entries.of(levels, light.reshape(-1, 1).repeat(3, axis=1)).upload()
     at = Array3f(points.T), Array3f(*UP[0].tolist()), UInt(1), Float(0.5)
@@ -174,9 +175,9 @@ def seen_in_cells(light):
 
 
 def test_lit_and_dark_entries_keep_their_own_light():
-    # Dark entries have larger relative errors: they do not take the mean of lit ones instead.
-    noise = np.random.default_rng(3).exponential(0.01, (4, 64))
-    light = np.array([1.0, 0.0, 0.0, 0.0])[:, None] + noise
+    # Dark entries have larger relative errors, one of 98 percent: they are not left out.
+    light = np.random.default_rng(3).exponential(0.01, (4, 64)) + np.array([1.0, 0.0, 0.0, 0.0])[:, None]
+    light[3] = np.r_[0.32, np.full(63, 1e-4)]
     np.testing.assert_allclose(seen_in_cells(light), light.mean(axis=1), rtol=1e-5)
 
 
@@ -189,14 +190,14 @@ def test_light_that_few_paths_find_is_shared_by_all_entries_around():
 
 def test_lookup_of_points_without_an_entry_misses():
     points, _ = random_points(200)
-    grid = Entries.of([keys(points * 0.0, np.tile(UP, (200, 1)), 0.7)], np.ones((200, 3))).upload()
+    grid = entries_of(keys(points * 0.0, np.tile(UP, (200, 1)), 0.7), np.ones((200, 3))).upload()
     far = Array3f((points + 50).T.astype(np.float32))
     assert not np.array(grid.lookup(far, Array3f(0, 0, 1), UInt(1), Float(0.7), Array3f(0.5))[1]).any()
 
 
 def test_moved_points_without_an_entry_use_their_own():
     point = np.float32([[0.1, 0.2, 0.01]])
-    own = Entries.of([np.repeat(keys(point, UP, 0.5), MIN_SAMPLES)], np.ones((MIN_SAMPLES, 3)))
+    own = entries_of(np.repeat(keys(point, UP, 0.5), MIN_SAMPLES), np.ones((MIN_SAMPLES, 3)))
     below = keys(point + np.float32([0.0, 0.0, -0.1]), UP, 0.5)
     assert below != keys(point, UP, 0.5)
     at = Array3f(point.T), Array3f(UP.T), UInt(1), Float(0.5)
@@ -204,31 +205,40 @@ def test_moved_points_without_an_entry_use_their_own():
     light, is_found = own.upload().lookup(*at, offset)
     assert np.array(is_found).all()
     np.testing.assert_allclose(np.array(light), 1.0)
-    both = Entries.joined([own, Entries.of([np.repeat(below, MIN_SAMPLES)], np.full((MIN_SAMPLES, 3), 7.0))])
+    both = Entries.joined([own, entries_of(np.repeat(below, MIN_SAMPLES), np.full((MIN_SAMPLES, 3), 7.0))])
     np.testing.assert_allclose(np.array(both.upload().lookup(*at, offset)[0]), 7.0)
+
+
+def test_samples_of_entries_that_are_too_many_go_to_larger_ones(monkeypatch):
+    points, normals = random_points(4000)
+    entries = Entries.of(keys_of_levels(points, normals, 1.2), np.ones((4000, 3)))
+    all_keys, _ = entries.chosen(MIN_SAMPLES)
+    monkeypatch.setattr(module, "MAX_ENTRIES", len(all_keys) // 2)
+    fewer = np.array(entries.upload().keys)
+    assert 0 < len(fewer) <= len(all_keys) // 2
+    np.testing.assert_array_equal(fewer, np.sort(entries.chosen(2 * MIN_SAMPLES)[0]))
 
 
 def test_of_too_many_entries_those_with_most_samples_are_uploaded(monkeypatch):
     monkeypatch.setattr(module, "MAX_ENTRIES", 50)
     points, normals = random_points(200)
     key = keys(points, normals, 0.01)
-    parts = [Entries.of([k], np.ones((len(k), 3))) for k in (key, *[key] * 3, *[key[:40]] * 4)]
-    kept = set(np.array(Entries.joined(parts).upload().keys).tolist())
-    assert len(kept) == 50
-    assert kept >= set(key[:40].tolist())
+    parts = [entries_of(k, np.ones((len(k), 3))) for k in (key, *[key] * 3, *[key[:40]] * 4)]
+    kept = np.array(Entries.joined(parts).upload().keys)
+    np.testing.assert_array_equal(kept, np.sort(key[:40]))
 
 
 def test_samples_that_are_not_finite_are_left_out():
     light = np.ones((6, 3))
     light[2, 1], light[4, 0] = np.nan, np.inf
-    entries = Entries.of([np.full(6, 9, np.uint64)], light)
+    entries = entries_of(np.full(6, 9, np.uint64), light)
     assert entries.counts.tolist() == [4]
     np.testing.assert_array_equal(entries.sums, [[4.0, 4.0, 4.0]])
 
 
 @pytest.mark.parametrize("count", [0, MIN_SAMPLES - 1])
 def test_entries_of_few_samples_are_not_uploaded(count):
-    entries = Entries.joined([Entries.of([np.full(count, 9, np.uint64)], np.ones((count, 3)))])
+    entries = Entries.joined([entries_of(np.full(count, 9, np.uint64), np.ones((count, 3)))])
     assert entries.upload() is None
 
 
@@ -240,10 +250,10 @@ def test_entries_with_most_of_their_light_from_one_path_are_not_uploaded():
     light = np.ones((14, 3))
     light[5] = 8.0
     key = np.full(14, 9, np.uint64)
-    assert Entries.of([key], light).upload() is not None
+    assert entries_of(key, light).upload() is not None
     light[5] = 30.0
-    assert Entries.of([key], light).upload() is None
-    confirmed = [Entries.of([key], light) for _ in range(4)]
+    assert entries_of(key, light).upload() is None
+    confirmed = [entries_of(key, light) for _ in range(4)]
     assert Entries.joined(confirmed).upload() is not None
 
 
@@ -253,7 +263,7 @@ def test_every_key_is_found_and_no_other(count):
     points, normals = random_points(2 * count, seed=count)
     key = keys(points, normals, 1e-4)
     light = np.arange(1, count + 1)[:, None] * np.ones(3)
-    grid = Entries.of([key[:count]], light).weighted(MIN_SAMPLES).upload()
+    grid = entries_of(key[:count], light).weighted(MIN_SAMPLES).upload()
     at = Array3f(points.T.astype(np.float32)), Array3f(normals.T.astype(np.float32)), UInt(1), Float(1e-4)
     found, is_hit = (np.array(v) for v in grid.lookup(*at))
     assert is_hit.tolist() == [True] * count + [False] * count
@@ -269,7 +279,25 @@ def test_lanes_that_are_not_looked_up_find_nothing():
 
 
 @pytest.mark.parametrize(
-    ("width", "height", "spp"), [(64, 36, 4), (320, 180, 4), (480, 270, 2), (640, 360, 1), (960, 540, 1)]
+    ("width", "height", "spp"), [(64, 36, 4), (320, 180, 4), (480, 270, 2), (640, 360, 1), (944, 528, 1)]
 )
 def test_larger_frames_have_as_many_gather_rays_and_no_pixel_has_none(width, height, spp):
     assert gather_spp(width * height) == spp
+
+
+def test_entries_of_fractional_weight_are_judged_with_their_group():
+    # One of 16 estimates, and seven of one estimate that can tell nothing of their variance.
+    points = np.float32([[x, y, z] for x in (0.1, 0.6) for y in (0.1, 0.6) for z in (0.1, 0.6)])
+    points = points.repeat([16, *[1] * 7], axis=0)
+    light = np.ones(len(points))
+    light[:16] += 0.6 * np.tile([1.0, -1.0], 8)
+    levels = keys_of_levels(points, np.tile(UP, (len(points), 1)), 0.5)
+    entries = Entries.of(levels, light[:, None].repeat(3, axis=1)).weighted(0.25)
+    assert levels[0][0] in entries.chosen(MIN_SAMPLES)[0]
+
+
+@pytest.mark.parametrize("width", [0.0, 1e-12, 2.0**95, np.inf])
+def test_sizes_at_the_limits_have_larger_ones(width):
+    levels = keys_of_levels(np.zeros((1, 3)), UP, width)
+    sizes = [int(key[0]) & SIZE_MASK for key in levels]
+    assert sizes == list(range(sizes[0], sizes[0] + LEVELS + 1))

@@ -9,7 +9,7 @@ from enfilade.gbuffer import find_geometry, positions
 from enfilade.images import write_exr
 from enfilade.kernels.random import one_sequence
 from enfilade.kernels.rays import camera_rays, pixel_centres
-from enfilade.methods.decoupled.hash_grid import Entries
+from enfilade.methods.decoupled.hash_grid_entries import Entries
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache, upload
 from enfilade.methods.decoupled.paths import compact, spawn
 from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE, VirtualImages

@@ -49,8 +49,8 @@ def test_only_variances_that_are_read_are_stored(deviation):
     np.testing.assert_allclose(np.array(reprojected.values[0]), np.array(averaged.values[0]), rtol=0.1)
 
 
-@pytest.mark.parametrize(("min_weight", "reach"), [(0.02, 0.97), (0.5, 0.5), (0.9, 0.1)])
-def test_points_beyond_the_visible_part_of_a_surface_are_found_up_to_the_least_weight(min_weight, reach):
+@pytest.mark.parametrize(("min_coverage", "reach"), [(0.02, 0.97), (0.5, 0.5), (0.9, 0.1)])
+def test_points_beyond_the_visible_part_of_a_surface_are_found_up_to_the_least_weight(min_coverage, reach):
     # The right half of the wall is hidden; `reach` is in pixels from the centre of the last visible one.
     geometry, irradiance = wall_with_a_bright_pixel(0.0)
     irradiance.is_known[:, W // 2 :] = False
@@ -61,7 +61,7 @@ def test_points_beyond_the_visible_part_of_a_surface_are_found_up_to_the_least_w
     pixels = np.stack([x, np.full(5, 3.5), np.ones(5)])
     points = geometry.camera.eye[:, None] + geometry.camera.direction_from_pixel @ pixels
     at = Array3f(points.astype(np.float32)), Array3f(0, 0, 1), UInt(1)
-    cache = IrradianceCache.of([uploaded, blank], [1.0, 1.0], view=uploaded, min_weight=min_weight)
+    cache = IrradianceCache.of([uploaded, blank], [1.0, 1.0], view=uploaded, min_coverage=min_coverage)
     for found, is_found in (cache.lookup(*at), cache.lookup_in_view(*at)):
         assert np.array(is_found).tolist() == [True, True, True, False, False]
         np.testing.assert_allclose(np.array(found)[0], [1, 1, 1, 0, 0], rtol=1e-5)

@@ -9,7 +9,8 @@ from enfilade.arrays import Array3f, Float, UInt
 from enfilade.camera.path import CameraPath, Segment
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.methods.decoupled import Decoupled
-from enfilade.methods.decoupled.hash_grid import Entries, entry_key
+from enfilade.methods.decoupled.hash_grid import LEVELS, entry_key
+from enfilade.methods.decoupled.hash_grid_entries import Entries
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.settings import Settings
 from support.in_memory import analysis_of
@@ -25,9 +26,9 @@ def path_of(count):
 def hash_grid_light(count):
     """What lookups at one point find along a shot whose keyframes found 1, 2, 3 ... there, and the grids."""
     at = Array3f(0.1), Array3f(0, 0, 1), UInt(1), Float(0.5)
-    key = np.repeat(np.array(entry_key(*at, 0)), 16)
+    levels = [np.repeat(np.array(entry_key(*at, level)), 16) for level in range(LEVELS + 1)]
     keyframes = range(0, SPACING * count, SPACING)
-    entries = {k: Entries.of([key], np.full((16, 3), 1.0 + k // SPACING)) for k in keyframes}
+    entries = {k: Entries.of(levels, np.full((16, 3), 1.0 + k // SPACING)) for k in keyframes}
     path = path_of(keyframes[-1] + 1)
     walk = SimpleNamespace(path=path, settings=Settings())
     inputs = SimpleNamespace(record=lambda _, k: entries[k])

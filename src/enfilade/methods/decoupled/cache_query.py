@@ -25,6 +25,8 @@ class CacheQuery:
         Of the path there, scene units.
     weight : Array3f
         Contribution of irradiance over pi to the pixel sample; 0 where there is no diffuse lobe.
+    bounces : UInt
+        Of the path before the point.
     sharp : tuple of Array3f
         Irradiance over pi by emitters with sharp shadows, where the images of the cache are soft.
     """
@@ -34,6 +36,7 @@ class CacheQuery:
     shape_index: Any
     width: Any
     weight: Any
+    bounces: Any
     sharp: Any
 
     @property
@@ -44,7 +47,7 @@ class CacheQuery:
 
 def query_view(cache: IrradianceCache, query: CacheQuery) -> tuple[Any, Any]:
     """Diffuse reflection of irradiance cached in the camera's view, and where that is missing."""
-    return _reflected(query, *cache.lookup_in_view(query.position, query.normal, query.shape_index))
+    return _reflected(cache, query, *cache.lookup_in_view(query.position, query.normal, query.shape_index))
 
 
 def query_hash_grid(
@@ -64,12 +67,14 @@ def query_hash_grid(
         return Array3f(0), Bool(where)
     at = query.position, query.normal, query.shape_index, query.width
     irradiance, is_found = cache.hash_grid.lookup(*at, offset, where)
-    return Array3f(dr.select(is_found, query.weight * irradiance, 0.0)), Bool(where & ~is_found)
+    share = cache.shares.of_others(query.bounces) if cache.shares else 1.0
+    return Array3f(dr.select(is_found, query.weight * share * irradiance, 0.0)), Bool(where & ~is_found)
 
 
 def query_further(cache: IrradianceCache, query: CacheQuery, sampler: Any, jitter: Any) -> tuple[Any, Any]:
     """Diffuse reflection of irradiance from the images, then from the hash grid; and where both miss."""
-    reflected, is_miss = _reflected(query, *cache.lookup(query.position, query.normal, query.shape_index))
+    at = query.position, query.normal, query.shape_index
+    reflected, is_miss = _reflected(cache, query, *cache.lookup(*at))
 
     # Jitter the position in the hash grid, so that many lookups interpolate.
     sampler = sampler.fork(STREAM_SALT)
@@ -78,6 +83,7 @@ def query_further(cache: IrradianceCache, query: CacheQuery, sampler: Any, jitte
     return Array3f(reflected + from_grid), is_miss
 
 
-def _reflected(query: CacheQuery, irradiance: Any, is_known: Any) -> tuple[Any, Any]:
-    reflected = dr.select(is_known, query.weight * sum(query.sharp, irradiance), 0.0)
+def _reflected(cache: IrradianceCache, query: CacheQuery, irradiance: Any, is_known: Any) -> tuple[Any, Any]:
+    share = cache.shares.of_images(query.bounces) if cache.shares else 1.0
+    reflected = dr.select(is_known, query.weight * sum(query.sharp, share * irradiance), 0.0)
     return Array3f(reflected), Bool(~is_known & query.is_needed)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from enfilade.methods.base import Output
-from enfilade.methods.decoupled.hash_grid import Entries
+from enfilade.methods.decoupled.hash_grid_entries import Entries
 from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
 from enfilade.methods.decoupled.light_camera import LIGHT_PIXELS, light_camera
 from enfilade.methods.decoupled.shot import ShotContext
@@ -19,13 +19,14 @@ from enfilade.renderer import PixelFilter, Purpose
 
 SPECULAR_SPP = 4  # specular rays of each pixel of the light camera
 SEEN_SPP = 4  # camera rays of each pixel of the light camera
-MAX_GATHER_SPP = 4  # final gather rays of each diffuse pixel of the prepass image, fewer in larger ones
+MAX_GATHER_SPP = 4  # final gather rays of each diffuse pixel of a prepass image (ATRIUM, GALLERY, KITCHEN)
 
 
 def gather_spp(pixels: int) -> int:
     """Final gather rays of a pixel of a prepass image with so many pixels.
 
-    What is uncertain in the hash grid is the light of whole surfaces: it depends on the number of all rays.
+    About as many in all at every size: the light of whole surfaces is uncertain, and that depends on their
+    total.
     """
     return min(max(round(LIGHT_PIXELS / pixels), 1), MAX_GATHER_SPP)
 

@@ -36,7 +36,9 @@ from enfilade.renderer import Branch, LobeRenderer
 SPECULAR_AOVS = 2  # reflection, transmission
 JITTER = 3.0  # range of lookups in the hash grid, in widths of an entry
 
-OnMiss = Callable[[list[npt.NDArray[np.uint64]], F32], None]  # keys by level, and irradiance over pi (N, 3)
+OnMiss = Callable[
+    [list[npt.NDArray[np.uint64]], F32], None
+]  # keys by level and above, and irradiance over pi (N, 3)
 
 
 @dataclass(frozen=True)
@@ -215,7 +217,7 @@ class Integrator:
         """
         found = dr.zeros(Array3f, count)
         if dr.width(path.lane):
-            _, irradiance, _ = self.kernels.estimate(cache.path_guide, path)
+            _, irradiance, _ = self.kernels.estimate(cache.path_guide, cache.shares, path)
             scatter_add(found, irradiance, path.lane)
         return found
 
@@ -329,7 +331,7 @@ class Integrator:
         missing: Any = dr.compress(is_miss)
         if dr.width(missing):
             unknown = compact(missed.path, missing)
-            weight, irradiance, keys = self.kernels.estimate(cache.path_guide, unknown)
+            weight, irradiance, keys = self.kernels.estimate(cache.path_guide, cache.shares, unknown)
             contributions.append((weight * irradiance, unknown.lane))
             if on_miss:
                 count = dr.width(missing)

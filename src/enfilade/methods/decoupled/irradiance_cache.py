@@ -14,6 +14,7 @@ from enfilade.kernels.estimate import GAUSSIAN_RADIUS_PX
 from enfilade.kernels.guiding import PathGuide
 from enfilade.kernels.rays import points_at
 from enfilade.methods.decoupled.hash_grid import HashGrid
+from enfilade.methods.decoupled.path_depth import DepthShares
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.decoupled.surface_image import (
     MIN_FOUND_WEIGHT,
@@ -26,6 +27,7 @@ from enfilade.methods.decoupled.surface_image import (
 from enfilade.methods.decoupled.wavelet import guide_of, redistribute_fireflies, smooth_along
 from enfilade.records import Geometry, Mask
 
+MIN_COVERAGE = 0.02  # by default
 FIREFLY = 2.0  # times the second brightest neighbour: brighter pixels are fireflies
 FIREFLY_LEVELS = 5  # of the wavelet that distributes their energy
 
@@ -47,8 +49,10 @@ class IrradianceCache:
         Whether the images are without next-event estimates of emitters that cast sharp shadows.
     path_guide : PathGuide or None
         Of paths that estimate irradiance.
-    min_weight : float
-        Weight of the pixels around a point, at most about one, above which an image shows it.
+    min_coverage : float
+        Bilinear weight of the pixels around a point that show its surface, above which the image does.
+    shares : DepthShares or None
+        Of paths that bounce off specular lobes before they meet the cache. None: all of it.
     """
 
     view: UploadedImage | None = None
@@ -57,7 +61,8 @@ class IrradianceCache:
     hash_grid: HashGrid | None = None
     soft_only: bool = False
     path_guide: PathGuide | None = None
-    min_weight: float = MIN_FOUND_WEIGHT
+    min_coverage: float = MIN_COVERAGE
+    shares: DepthShares | None = None
 
     @staticmethod
     def of(
@@ -68,17 +73,20 @@ class IrradianceCache:
         view: UploadedImage | None = None,
         soft_only: bool = False,
         path_guide: PathGuide | None = None,
-        min_weight: float = MIN_FOUND_WEIGHT,
+        min_coverage: float = MIN_COVERAGE,
+        shares: DepthShares | None = None,
     ) -> IrradianceCache:
         """A cache of some images with their weights."""
         own = tuple(opaque(float(weight)) for weight in weights)
-        return IrradianceCache(view, tuple(images), own, hash_grid, soft_only, path_guide, min_weight)
+        return IrradianceCache(
+            view, tuple(images), own, hash_grid, soft_only, path_guide, min_coverage, shares
+        )
 
     def lookup_in_view(self, position: Any, normal: Any, shape_index: Any) -> tuple[Any, Any]:
         """The same as :meth:`lookup`, from the image in the view of the camera."""
         if self.view is None:
             return Array3f(0), Bool(False)
-        return _mean([(self.view, Float(1))], position, normal, shape_index, self.min_weight)
+        return _mean([(self.view, Float(1))], position, normal, shape_index, self.min_coverage)
 
     def lookup(self, position: Any, normal: Any, shape_index: Any) -> tuple[Any, Any]:
         """Irradiance over pi at points, from the images.
@@ -95,7 +103,7 @@ class IrradianceCache:
         is_found : Bool
         """
         return _mean(
-            zip(self.images, self.weights, strict=True), position, normal, shape_index, self.min_weight
+            zip(self.images, self.weights, strict=True), position, normal, shape_index, self.min_coverage
         )
 
 
@@ -104,13 +112,13 @@ def _mean(
     position: Any,
     normal: Any,
     shape_index: Any,
-    min_weight: float,
+    min_coverage: float,
 ) -> tuple[Any, Any]:
     """Weighted mean of images at points (Array3f), and whether any shows them (Bool)."""
     total, weight = Array3f(0), Float(0)
     for one, own in images:
         found = lookup(position, normal, shape_index, one, margin=GAUSSIAN_RADIUS_PX)
-        its_weight = dr.select(found.weight > min_weight, own, 0.0)
+        its_weight = dr.select(found.coverage > min_coverage, own, 0.0)
         total += its_weight * sum(found.totals, Array3f(0))
         weight += its_weight * found.weight
     is_found = weight > 0.0

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from enfilade.camera.path import Segment
 from enfilade.methods.analysis import Analysis, keyframes_of
 from enfilade.methods.base import FRAMES, Inputs, Method, Output, Pass, Task, TaskId
-from enfilade.methods.decoupled.hash_grid import Entries
+from enfilade.methods.decoupled.hash_grid_entries import Entries
 from enfilade.methods.decoupled.hash_grid_fill import fill_hash_grid
 from enfilade.methods.decoupled.integrator import Integrator
 from enfilade.methods.decoupled.irradiance import fill_disocclusions, gather_keyframe
@@ -44,7 +44,7 @@ class Decoupled(Method):
     """Irradiance cached at keyframes; visibility, texture, edges and specular lobes in every frame."""
 
     name = "decoupled"
-    revision = 42
+    revision = 43
     needs_lobes = True
     has_tone_curve = True
     settings = (TraceSettings, ViewingSettings, KeyframeSettings, DecoupledSettings)

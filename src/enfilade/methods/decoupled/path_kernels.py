@@ -14,6 +14,7 @@ from enfilade.methods.decoupled.cache_query import CacheQuery, query_further, qu
 from enfilade.methods.decoupled.guiding import trace_probes
 from enfilade.methods.decoupled.hash_grid import LEVELS, entry_key
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
+from enfilade.methods.decoupled.path_depth import DepthShares
 from enfilade.methods.decoupled.paths import Path
 from enfilade.methods.decoupled.surface_image import UploadedImage, lookup
 from enfilade.records import MIN_DIFFUSE_ALBEDO, SurfaceClass
@@ -136,6 +137,7 @@ class PathKernels:
             shape_index=point.surfaces.shape_index,
             width=path.width_at(point),
             weight=dr.select(is_diffuse, path.throughput * albedo, 0.0),
+            bounces=path.bounces,
             sharp=sharp,
         )
         reflected, is_miss = query_view(cache, query)
@@ -223,7 +225,7 @@ class PathKernels:
         Returns
         -------
         keys : tuple of UInt64
-            One a level.
+            One a level, and one above.
         irradiance : Array3f
             Over pi; 0 where the images do not show the surface.
         is_known, is_missing : Bool
@@ -236,7 +238,9 @@ class PathKernels:
         is_diffuse &= path.is_active
         return _keys(point, path), irradiance, Bool(is_diffuse & is_known), Bool(is_diffuse & ~is_known)
 
-    def _estimate(self, guide: PathGuide | None, path: Path) -> tuple[Any, Any, tuple[Any, ...]]:
+    def _estimate(
+        self, guide: PathGuide | None, shares: DepthShares | None, path: Path
+    ) -> tuple[Any, Any, tuple[Any, ...]]:
         """Path trace the irradiance at the next surface; also its weight, and its keys in the hash grid.
 
         Its depth is that of a surface seen directly, or after one bounce, as of the irradiance in the cache:
@@ -247,7 +251,8 @@ class PathKernels:
         path_depth = 2 if path.bounce else 1
         direct, indirect = self._renderer.estimate_diffuse(point, sampler, path_depth, guide)
         irradiance = Array3f(direct + indirect)
-        return Array3f(path.throughput * point.surfaces.albedo), irradiance, _keys(point, path)
+        share = shares.of_others(path.bounces) if shares else 1.0
+        return Array3f(path.throughput * share * point.surfaces.albedo), irradiance, _keys(point, path)
 
     def _terminate(self, path: Path) -> Any:
         """Path trace the specular lobes at the next surface to their end."""

@@ -10,9 +10,11 @@ from enfilade.kernels.estimate import Samples
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.denoising import denoise_irradiance
 from enfilade.methods.decoupled.guiding import find_regions
+from enfilade.methods.decoupled.path_depth import light_by_depth
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.renderer import Purpose
+from enfilade.settings import LimitSettings
 
 SPP = 2
 OUTLIER = 16.0  # times the denoised irradiance: brighter estimates are limited where the mean is kept
@@ -37,6 +39,13 @@ def trace_prepass(shot: ShotContext, frame: int) -> Output:
         walk.random(frame, Purpose.PREPASS),
     )
     estimate.add(SPP)
+    by_depth, cut_short = light_by_depth(
+        renderer,
+        geometry,
+        guide,
+        walk.random(frame, Purpose.DEPTHS),
+        paths_in_flight=walk.settings[LimitSettings].paths_in_flight,
+    )
     direct, indirect = (shading.to_image(where) for shading in estimate.shadings)
     image = IrradianceImage(direct, indirect, where)
     if (denoiser := shot.settings.denoiser) != "none":
@@ -46,8 +55,9 @@ def trace_prepass(shot: ShotContext, frame: int) -> Output:
         )
     count = estimate.count
     metadata = {
-        "rays": {"prepass": count.rays, "path_guide": guide_paths},
+        "rays": {"prepass": count.rays, "cut_short": cut_short.rays, "path_guide": guide_paths},
         "dropped": count.dropped,
+        "light_by_depth": by_depth,
         "regions": regions.to_json() if regions else [],
     }
     return Output({frame: image}, metadata)

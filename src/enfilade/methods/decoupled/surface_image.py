@@ -71,6 +71,8 @@ class Found:
         Weighted sums of the variances.
     weight : Float
         Sum of the weights; 0 where the surface is not in the image, at most about one.
+    coverage : Float
+        Bilinear weight of the valid pixels, 0..1.
     taper : Float
         Falls from 1 to nearly 0 towards the borders of the image: where images are averaged with this
         weight, there is no seam at the border of one.
@@ -79,6 +81,7 @@ class Found:
     totals: tuple[Any, ...]
     variances: tuple[Any, ...]
     weight: Any
+    coverage: Any
     taper: Any
 
 
@@ -199,7 +202,7 @@ def lookup(
 
     # Interpolate between the four neighbouring pixels.
     totals, variances = [Array3f(0) for _ in image.values], [Float(0) for _ in image.values]
-    weight = Float(0)
+    weight, coverage = Float(0), Float(0)
     for tap in taps_around(x, y, width=image.width, height=image.height):
         # Test that the pixel shows the same surface.
         depth = dr.gather(Float, image.depths, tap.lane, is_inside)
@@ -218,7 +221,8 @@ def lookup(
             totals[layer] += of_tap * Array3f(dr.gather(type(value), value, tap.lane, is_same))
             variances[layer] += of_tap * dr.gather(Float, variance, tap.lane, is_same)
         weight += of_tap
-    return Found(tuple(totals), tuple(variances), weight, taper)
+        coverage += dr.select(of_tap > 0.0, tap.weight, 0.0)
+    return Found(tuple(totals), tuple(variances), weight, coverage, taper)
 
 
 def packed(normal: Any) -> Any:

@@ -17,7 +17,7 @@ from enfilade.kernels.estimate import RayCount
 from enfilade.kernels.random import one_sequence
 from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.methods.decoupled.denoising import NOISE_SHARE, OUTLIER, denoise_light
-from enfilade.methods.decoupled.hash_grid import Entries
+from enfilade.methods.decoupled.hash_grid_entries import Entries
 from enfilade.methods.decoupled.paths import Path
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.virtual_images import CHOICES, IN_VIRTUAL_IMAGE

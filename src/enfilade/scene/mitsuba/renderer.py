@@ -7,6 +7,7 @@ change of its size or crop compiles kernels anew, and its Gaussian filter adds i
 from __future__ import annotations
 
 from functools import cached_property
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -81,7 +82,11 @@ class MitsubaRenderer:
         self._scene = scene = self._merged.scene
         self._paths_in_flight = paths_in_flight
         self._integrator = scene_integrator(scene, max_depth)
-        self._continued = [shortened(self._integrator, depth) for depth in range(1, MAX_PATH_DEPTH + 1)]
+        depths = range(1, MAX_PATH_DEPTH + 1)
+        self._continued = {
+            (begin, end): shortened(self._integrator, begin, limited_as=end)
+            for begin, end in sorted({*zip(depths, depths, strict=True), *product([1], depths)})
+        }
         # The medium around the camera is that of the scene's sensor; poses are those of the camera path.
         self._medium = next((sensor.get_medium() for sensor in scene.sensors()), None)
         self._sampler = _lane_sampler()
@@ -140,7 +145,7 @@ class MitsubaRenderer:
 
     def state(self) -> Any:
         """See :meth:`enfilade.renderer.LobeRenderer.state`."""
-        integrators = self._integrator, self._continued
+        integrators = self._integrator, list(self._continued.values())
         lights = self._transport.sharp_emitters.state
         lobes = self._lobes.state, self._lobes.specular_albedos
         return self._scene, integrators, self._shapes.state, lobes, lights
@@ -198,15 +203,22 @@ class MitsubaRenderer:
         )
 
     def estimate_diffuse(
-        self, point: ShadingPoint, sampler: Any, path_depth: int = 1, guide: PathGuide | None = None
+        self,
+        point: ShadingPoint,
+        sampler: Any,
+        path_depth: int = 1,
+        guide: PathGuide | None = None,
+        *,
+        limited_as: int | None = None,
     ) -> tuple[Any, Any]:
         """See :meth:`enfilade.renderer.LobeRenderer.estimate_diffuse`."""
         sample = self._transport.sample_diffuse(point, sampler, guide=guide)
-        return self._transport.estimate(sample, sampler, path_depth)
+        return self._transport.estimate(sample, sampler, path_depth, limited_as or path_depth)
 
     def estimate_specular(self, point: ShadingPoint, sampler: Any, path_depth: int = 1) -> tuple[Any, Any]:
         """See :meth:`enfilade.renderer.LobeRenderer.estimate_specular`."""
-        return self._transport.estimate(self._transport.sample_specular(point, sampler), sampler, path_depth)
+        sample = self._transport.sample_specular(point, sampler)
+        return self._transport.estimate(sample, sampler, path_depth, path_depth)
 
     def sharp_light(self, point: ShadingPoint, sampler: Any, *, specular: bool = False) -> tuple[Any, Any]:
         """See :meth:`enfilade.renderer.LobeRenderer.sharp_light`."""
@@ -292,9 +304,11 @@ class MitsubaRenderer:
             *_, ray = self._intersect_beyond(ray, Bool(True), NULL_PATH)
         return self._sampled(self._integrator, ray, sampler)[0]
 
-    def _continued_radiance(self, rays: Rays, sampler: Any, path_depth: int, active: Any) -> tuple[Any, Any]:
-        """Radiance along rays that continue paths of a depth; whether emission that is passed is in it."""
-        radiance, is_valid = self._sampled(self._continued[path_depth - 1], _ray(rays), sampler, active)
+    def _continued_radiance(
+        self, rays: Rays, sampler: Any, depths: tuple[int, int], active: Any
+    ) -> tuple[Any, Any]:
+        """Radiance along rays that continue paths; whether emission that is passed is in it."""
+        radiance, is_valid = self._sampled(self._continued[depths], _ray(rays), sampler, active)
         return radiance, is_valid | self._is_volumetric
 
     def _sampled(self, integrator: Any, ray: Any, sampler: Any, active: Any = True) -> tuple[Any, Any]:

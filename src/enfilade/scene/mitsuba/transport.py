@@ -21,7 +21,7 @@ RARE_WEIGHT = 1e-4  # of MIS: next-event estimation samples a direction 100 time
 GUIDE_SALT = 0x632BE5AB  # makes guided directions independent of the path's random numbers
 ROULETTE_LAYERS = 3  # null interactions, after which Russian roulette may end a path
 
-Radiance = Callable[[Rays, Any, int, Any], tuple[Any, Any]]
+Radiance = Callable[[Rays, Any, tuple[int, int], Any], tuple[Any, Any]]
 
 
 class LightTransport:
@@ -34,7 +34,7 @@ class LightTransport:
         Of its BSDFs.
     radiance
         The path tracer: radiance along rays, and whether emission that is passed is in it; from the rays,
-        their samplers, the path depth at which they begin, and which of them are traced.
+        their samplers, the path depths at which they begin and as of which they end, and which are traced.
     shadow_rays
     """
 
@@ -59,9 +59,10 @@ class LightTransport:
         emitter_pdf = dr.select(bounce.soft_only, apart, emitter_pdf)
         return Array3f(emitted * dr.select(bounce.is_delta, 1.0, mis_weight(bounce.pdf, emitter_pdf)))
 
-    def estimate(self, sample: BsdfSample, sampler: Any, path_depth: int) -> tuple[Any, Any]:
+    def estimate(self, sample: BsdfSample, sampler: Any, path_depth: int, limited_as: int) -> tuple[Any, Any]:
         """Direct and indirect radiance of a sample: its path is continued by the path tracer."""
-        found, is_valid = self._radiance(sample.rays, sampler, path_depth, sample.is_alive)
+        depths = path_depth, limited_as
+        found, is_valid = self._radiance(sample.rays, sampler, depths, sample.is_alive)
         # The path tracer adds the emission of the first hit unweighted: replace it by the weighted one.
         met, unweighted, weighted, is_rare = self._emission_along(sample)
         # Mitsuba's `path` returns nothing for paths that meet null interactions alone and leave the scene.
