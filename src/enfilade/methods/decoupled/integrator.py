@@ -137,7 +137,9 @@ class Integrator:
         count = dr.width(path.lane)
         return Samples(self._reflected(cache, compact(path, path.lane), count, on_miss))
 
-    def specular_radiance_at_edges(self, aovs: UploadedImage, cache: IrradianceCache, path: Path) -> Samples:
+    def specular_radiance_at_edges(
+        self, aovs: UploadedImage, cache: IrradianceCache, path: Path, *, unit: float = 1.0
+    ) -> Samples:
         """The same from filtered AOVs of the pixels' centres; traced where these do not show the surface.
 
         Parameters
@@ -146,12 +148,14 @@ class Integrator:
             Both AOVs of the surfaces at pixel centres, without the pixels whose values are to be traced.
         cache, path
             As of :meth:`specular_radiance`.
+        unit
+            Of the AOVs: radiance that is 1 after exposure.
 
         Returns
         -------
         Samples
         """
-        *found, is_missing = self.kernels.see_aovs(aovs, path)
+        *found, is_missing = self.kernels.see_aovs(aovs, opaque(unit), path)
         missing = compact(path, dr.compress(is_missing))
         if not dr.width(missing.lane):
             return Samples(tuple(found))

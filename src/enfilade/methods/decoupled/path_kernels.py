@@ -110,13 +110,13 @@ class PathKernels:
         emitted, vertex = self._intersect(cache, path)
         return replace(vertex, radiance=emitted + vertex.radiance)
 
-    def _see_aovs(self, aovs: UploadedImage, path: Path) -> tuple[Any, ...]:
+    def _see_aovs(self, aovs: UploadedImage, unit: Any, path: Path) -> tuple[Any, ...]:
         """Camera rays: intersect, and look up the AOVs; whether they miss a surface with specular lobes."""
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
         at = point.position, point.surfaces.normal, point.surfaces.shape_index
         found = lookup(*at, aovs, min_cosine=AOV_COSINE)
         is_found = (found.weight > 0.0) & ~point.may_pass  # what is seen through it changes with its opacity
-        scale = dr.select(is_found & point.has_specular, dr.rcp(dr.maximum(found.weight, 1e-12)), 0.0)
+        scale = dr.select(is_found & point.has_specular, unit * dr.rcp(dr.maximum(found.weight, 1e-12)), 0.0)
         return *(Array3f(total * scale) for total in found.totals), Bool(point.has_specular & ~is_found)
 
     def _intersect(self, cache: IrradianceCache, path: Path) -> tuple[Any, Vertex]:

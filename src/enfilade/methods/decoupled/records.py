@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.arrays import to_float
+from enfilade.arrays import to_float, to_half
 from enfilade.records import F32, U8, Mask, Shading, check_array
 
 F16 = npt.NDArray[np.float16]
@@ -49,6 +49,8 @@ class IrradianceImage:
 class SpecularAov:
     """Radiance reflected or transmitted by specular lobes, before temporal accumulation.
 
+    In units of the radiance that is 1 after exposure, for which half floats are precise.
+
     Attributes
     ----------
     color : (H, W, 3) float16
@@ -63,10 +65,16 @@ class SpecularAov:
         check_array(self.color, (*self.deviation.shape, 3), np.float16, "color")
         check_array(self.deviation, self.color.shape[:2], np.float16, "deviation")
 
+    @staticmethod
+    def of(color: F32, deviation: F32, unit: float) -> SpecularAov:
+        """The AOV of radiance (H, W, 3) and its deviation (H, W); `unit` is 1 after exposure."""
+        scale = np.float32(1.0 / unit)
+        return SpecularAov(to_half(scale * color), to_half(scale * deviation))
+
 
 @dataclass(frozen=True, eq=False)
 class ShadedFrame:
-    """A frame before temporal accumulation.
+    """A frame before temporal accumulation, in the units of :class:`SpecularAov`.
 
     Attributes
     ----------

@@ -38,8 +38,13 @@ def shade(shot: ShotContext, frame: int) -> Output:
     provenance = _provenance(geometry, cache, seen, is_keyframe=frame in shot.keyframes)
     reflection, *others = specular.aovs
     transmission = others[0] if others else None
+    scale = np.float32(1.0 / shot.unit)
     shaded = ShadedFrame(
-        to_half(diffuse_image.color), reflection, transmission, to_half(np.sqrt(variance)), provenance
+        to_half(scale * diffuse_image.color),
+        reflection,
+        transmission,
+        to_half(scale * np.sqrt(variance)),
+        provenance,
     )
     rays = {"camera": count.rays, "specular": specular.count.rays}
     return Output({frame: shaded}, {"rays": rays, "dropped": (count + specular.count).dropped})

@@ -10,7 +10,7 @@ import drjit as dr
 import numpy as np
 import scipy.ndimage
 
-from enfilade.arrays import Array3f, Array3f16, Float, image, lanes, to_half
+from enfilade.arrays import Array3f, Array3f16, Float, image, lanes
 from enfilade.methods.decoupled.denoising import denoise_light
 from enfilade.methods.decoupled.records import SpecularAov
 from enfilade.methods.decoupled.surface_image import UploadedImage, upload_layers
@@ -27,7 +27,7 @@ FIREFLY = 2.0  # times the brightest neighbour: brighter pixels are fireflies
 
 
 def filter_spatially(
-    virtual: Sequence[Geometry], aovs: Sequence[Shading], where: Mask, *, is_denoised: bool
+    virtual: Sequence[Geometry], aovs: Sequence[Shading], where: Mask, *, is_denoised: bool, unit: float = 1.0
 ) -> list[SpecularAov]:
     """Denoise specular AOVs, or smooth them along the surfaces that are seen in them by the wavelet filter.
 
@@ -41,6 +41,8 @@ def filter_spatially(
         Pixels that were sampled; others do not contribute.
     is_denoised
         Whether to use the denoiser.
+    unit
+        Radiance that is 1 after exposure.
 
     Returns
     -------
@@ -51,15 +53,15 @@ def filter_spatially(
         replace(g, depth=np.where(g.shape_index < IN_VIRTUAL_IMAGE, g.depth, np.float32(0))) for g in virtual
     ]
     if is_denoised:
-        return [_denoised(g, aov, where) for g, aov in zip(surfaces, aovs, strict=True)]
+        return [_denoised(g, aov, where, unit) for g, aov in zip(surfaces, aovs, strict=True)]
     height, width = where.shape
     # Find fireflies in the sum: where few rays sample an AOV, each of its samples would be one.
     total = sum((lanes(aov.color) for aov in aovs), Array3f(0))
     weights = firefly_weights(total, width=width, height=height, times=FIREFLY)
-    return [_filtered(g, aov, where, weights) for g, aov in zip(surfaces, aovs, strict=True)]
+    return [_filtered(g, aov, where, weights, unit) for g, aov in zip(surfaces, aovs, strict=True)]
 
 
-def with_edges(aov: SpecularAov, edges: Shading, where: Mask) -> SpecularAov:
+def with_edges(aov: SpecularAov, edges: Shading, where: Mask, unit: float = 1.0) -> SpecularAov:
     """An AOV with other values at its edges, without deviation: other frames that differ count little there.
 
     Parameters
@@ -68,9 +70,12 @@ def with_edges(aov: SpecularAov, edges: Shading, where: Mask) -> SpecularAov:
     edges
         Of shape (H, W).
     where : (H, W) bool
+    unit
+        Radiance that is 1 after exposure.
     """
-    color = np.where(where[..., None], to_half(edges.color), aov.color)
-    return SpecularAov(color, np.where(where, np.float16(0), aov.deviation))
+    certain = SpecularAov.of(edges.color, np.zeros_like(edges.variance), unit)
+    color = np.where(where[..., None], certain.color, aov.color)
+    return SpecularAov(color, np.where(where, certain.deviation, aov.deviation))
 
 
 def upload_aovs(geometry: Geometry, aovs: Sequence[SpecularAov], count: int, where: Mask) -> UploadedImage:
@@ -91,7 +96,7 @@ def upload_aovs(geometry: Geometry, aovs: Sequence[SpecularAov], count: int, whe
     return upload_layers(geometry, lanes(where), [*layers, *[black] * (count - len(layers))])
 
 
-def _denoised(geometry: Geometry, aov: Shading, where: Mask) -> SpecularAov:
+def _denoised(geometry: Geometry, aov: Shading, where: Mask, unit: float) -> SpecularAov:
     """Denoise an AOV, guided by the surfaces that are seen in it."""
     color = denoise_light(geometry, aov, where, quality=DENOISER, outlier=OUTLIER, is_extended=True)
     # Average the deviation over the sampled pixels.
@@ -100,12 +105,12 @@ def _denoised(geometry: Geometry, aov: Shading, where: Mask) -> SpecularAov:
         for of in (np.sqrt(aov.variance), where.astype(np.float32))
     )
     deviation *= DENOISED_SHARE / np.maximum(share, 1.0 / DENOISED_SUPPORT**2)
-    return SpecularAov(to_half(color), to_half(deviation))
+    return SpecularAov.of(color, deviation, unit)
 
 
-def _filtered(geometry: Geometry, aov: Shading, where: Mask, weights: Any) -> SpecularAov:
+def _filtered(geometry: Geometry, aov: Shading, where: Mask, weights: Any, unit: float) -> SpecularAov:
     """Clamp the fireflies of an AOV by their weights, and smooth it along surfaces."""
     noise = NOISE_SHARE * lanes(aov.variance)
     color, variance = smooth_along(geometry, where, weights * lanes(aov.color), noise)
     deviation = np.sqrt(image(variance, *where.shape))
-    return SpecularAov(to_half(image(color, *where.shape)), to_half(deviation))
+    return SpecularAov.of(image(color, *where.shape), deviation, unit)

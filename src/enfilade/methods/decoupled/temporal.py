@@ -65,27 +65,26 @@ class TemporalAccumulation:
         """A frame whose specular AOVs are averaged over its window, with weights that fall linearly."""
         path, shaded = shot.walk.path, self._record(shot, frame)
         geometry, color = shot.walk.view(frame).geometry, to_float(shaded.diffuse)
+        white = shot.white / shot.unit  # in the units of shaded frames
         frames = window(path, path.shots()[shot.number], frame)
         weights = {f: 1.0 - abs(path.distance(f) - path.distance(frame)) / (REACH + 1) for f in frames}
         if np.any(shaded.provenance == Provenance.SPECULAR):
             aovs = {f: self._aovs(shot, f) for f in frames}
             for k, here in enumerate(aovs.pop(frame)):
                 neighbours = [(of[k], weights[f]) for f, of in aovs.items() if k < len(of)]
-                color = color + accumulate_temporally(geometry, here, neighbours, unit=shot.unit)
+                color = color + accumulate_temporally(geometry, here, neighbours, unit=1.0)
 
         # Average refined pixels.
         if shaded.deviation.any():
             displayed = {f: self._displayed_image(shot, f) for f in frames}
             shown, where = displayed.pop(frame), shaded.deviation > 0
             deviation = to_float(shaded.deviation)
-            here = redisplayed(shown, color, deviation, where, white=shot.white)
+            here = redisplayed(shown, color, deviation, where, white=white)
             neighbours = [(other, weights[f]) for f, other in displayed.items()]
-            color = accumulate_refined(
-                geometry, color, here, neighbours, white=shot.white, unit=shot.unit / shot.white
-            )
+            color = accumulate_refined(geometry, color, here, neighbours, white=white, unit=1.0 / white)
 
         # Specular lobes that are a difference have negative samples: clip the sum.
-        return Frame(np.maximum(color, 0.0), shaded.provenance)
+        return Frame(np.float32(shot.unit) * np.maximum(color, 0.0), shaded.provenance)
 
     def _displayed_image(self, shot: ShotContext, frame: int) -> UploadedImage:
         """A shaded frame as it is displayed, on the device."""
@@ -93,7 +92,7 @@ class TemporalAccumulation:
         def make() -> UploadedImage:
             shaded, virtual = self._record(shot, frame), self._virtual_geometry(shot, frame)
             deviation = to_float(shaded.deviation)
-            return upload_displayed(virtual, shaded.color, deviation, white=shot.white)
+            return upload_displayed(virtual, shaded.color, deviation, white=shot.white / shot.unit)
 
         return self._displayed.get(frame, make)
 
