@@ -331,6 +331,10 @@ class LobeRenderer(Renderer, Protocol):
         """The same points at each call: they suggest where bright surfaces are."""
         ...
 
+    def has_depth_limit(self) -> bool:
+        """Whether the scene limits the depth of paths."""
+        ...
+
     def has_sharp_light(self) -> bool:
         """Whether any emitter casts sharp shadows: a point, spot or directional one, small lamp, or sun."""
         ...
@@ -365,7 +369,8 @@ class LobeRenderer(Renderer, Protocol):
         path_depth: int = 1,
         guide: Any = None,
         *,
-        limited_as: int | None = None,
+        end_depth: int | None = None,
+        soft_only: bool = False,
     ) -> tuple[Any, Any]:
         """Estimate the radiance reflected by the diffuse lobe, divided by the albedo, with one path.
 
@@ -380,8 +385,10 @@ class LobeRenderer(Renderer, Protocol):
             limits the length of paths.
         guide : PathGuide or None
             Of the sampled direction.
-        limited_as
-            End paths from ``path_depth`` 1 as those that begin at this depth, and otherwise alike.
+        end_depth
+            With ``path_depth`` 1: paths end as those that begin at this depth, and are the same otherwise.
+        soft_only
+            Without next-event estimates of emitters that cast sharp shadows.
 
         Returns
         -------

@@ -66,9 +66,9 @@ def test_irradiance_on_sheer_surfaces_is_cached(tmp_path, monkeypatch):
         begin(kernels, renderer)
         estimate = kernels.estimate
 
-        def estimate_and_count(guide, shares, path):
+        def estimate_and_count(guide, depth_weights, path):
             estimated.append(int(dr.count(path.is_active)[0]))
-            return estimate(guide, shares, path)
+            return estimate(guide, depth_weights, path)
 
         kernels.estimate = estimate_and_count
 

@@ -7,8 +7,9 @@ from enfilade.arrays import UInt
 from enfilade.camera.path import CameraPath
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry
+from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.methods.decoupled import Decoupled
-from enfilade.methods.decoupled.path_depth import depth_shares, light_by_depth
+from enfilade.methods.decoupled.path_depth import DepthWeights, light_by_depth, weight_after
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
 from support.in_memory import run_passes, walk_of
@@ -49,38 +50,57 @@ def test_light_behind_glass_is_that_of_paths_of_limited_depth(tmp_path, max_dept
     assert found / traced.color.mean() == pytest.approx(1.0, abs=tolerance)
 
 
-def test_paths_that_are_cut_short_bring_less_light(tmp_path):
-    renderer = room_with_a_ball_of_glass(tmp_path, 5)
-    geometry = find_geometry(renderer, CAMERAS[MIDDLE])
-    key = RandomKey(1, MIDDLE, Purpose.DEPTHS)
+def light_of(renderer):
+    geometry, key = find_geometry(renderer, CAMERAS[MIDDLE]), RandomKey(1, MIDDLE, Purpose.DEPTHS)
     light, count = light_by_depth(renderer, geometry, None, key, paths_in_flight=1 << 18)
-    assert count.rays == geometry.has_diffuse.sum()
-    *by_depth, sharp = light
+    assert count.rays == 4 * geometry.has_diffuse.sum()
+    return np.array(light) / geometry.has_diffuse.sum()
+
+
+def test_paths_that_end_early_bring_less_light(tmp_path):
+    *soft, sharp = light_of(room_with_a_ball_of_glass(tmp_path, 5))
     assert sharp == 0.0
-    assert np.all(np.diff(by_depth) < 0.0)
+    assert np.all(np.diff(soft) < 0.0)
     # Of walls of reflectance 0.8 each bounce brings about that much of the last one.
-    assert by_depth[1] / by_depth[0] == pytest.approx(0.85, abs=0.07)
+    assert soft[1] / soft[0] == pytest.approx(0.85, abs=0.07)
 
 
-def test_paths_without_limit_bring_all_light_at_every_depth(tmp_path):
-    renderer = room_with_a_ball_of_glass(tmp_path, -1)
-    geometry = find_geometry(renderer, CAMERAS[MIDDLE])
-    light, _ = light_by_depth(
-        renderer, geometry, None, RandomKey(1, MIDDLE, Purpose.DEPTHS), paths_in_flight=1 << 18
-    )
-    np.testing.assert_array_equal(np.diff(light[:4]), 0.0)
+def test_sharp_light_is_apart(tmp_path):
+    point = '<emitter type="point"><point name="position" value="0, 3, 2"/></emitter></scene>'
+    file = tmp_path / "both.xml"
+    file.write_text(SCENE.format(max_depth=6).replace("</scene>", point))
+    renderer = MitsubaRenderer(file)
+    *soft, sharp = light_of(renderer)
+    assert 0.0 < sharp < soft[-1] < soft[0]
+    found, traced = find_geometry(renderer, CAMERAS[MIDDLE]), MitsubaRenderer(file, max_depth=6)
+    pixels = np.flatnonzero(found.has_diffuse).astype(np.uint32)
+    key = RandomKey(2, MIDDLE, Purpose.REFERENCE)
+    whole = traced.trace(CAMERAS[MIDDLE], pixels, key, spp=64).color @ REC709_LUMINANCE
+    assert whole.mean() / 0.8 == pytest.approx(soft[0] + sharp, rel=0.05)
 
 
-def test_shares_are_relative_to_the_depth_at_which_cached_paths_begin():
-    light = [[10.0, 8.0, 6.0, 4.0, 2.0], [10.0, 8.0, 6.0, 4.0, 2.0]]  # of two keyframes; the last is sharp
-    shares = depth_shares(light, has_sharp_light=True)
+def test_only_scenes_that_limit_the_depth_of_paths_need_it(tmp_path):
+    assert room_with_a_ball_of_glass(tmp_path, 8).has_depth_limit()
+    assert not room_with_a_ball_of_glass(tmp_path, -1).has_depth_limit()
+
+
+def test_without_limit_nothing_is_weighted(tmp_path):
+    found = run_passes(Decoupled(), walk_of(PATH, room_with_a_ball_of_glass(tmp_path, -1)))
+    assert all(of["light_by_depth"] is None for of in found.task_metadata.values() if "light_by_depth" in of)
+
+
+def test_weights_are_relative_to_the_depth_at_which_cached_paths_begin():
+    light = [[8.0, 6.0, 4.0, 2.0, 2.0], [8.0, 6.0, 4.0, 2.0, 2.0]]  # of two keyframes; the last is sharp
+    weights, prepass = DepthWeights.of(light), DepthWeights.of_prepass(light)
     bounces = UInt([0, 1, 2, 3, 7])
-    np.testing.assert_allclose(np.array(shares.of_images(bounces)), [1, 6 / 8, 4 / 8, 2 / 8, 2 / 8])
-    np.testing.assert_allclose(np.array(shares.of_others(bounces)), [1, 1, 6 / 8, 4 / 8, 4 / 8])
+    others = [10 / 8, 1, 6 / 8, 4 / 8, 4 / 8]
+    found = weight_after(weights.images, bounces)
+    np.testing.assert_allclose(np.array(found), [1, 6 / 8, 4 / 8, 2 / 8, 2 / 8])
+    for of in (weights.others, prepass.images, prepass.others):
+        np.testing.assert_allclose(np.array(weight_after(of, bounces)), others)
 
 
-@pytest.mark.parametrize("light", [[], [[0.0] * 5]])
-def test_without_light_nothing_is_left_out(light):
-    shares = depth_shares(light, has_sharp_light=False)
-    for of in (shares.images, shares.others):
+def test_without_light_nothing_is_left_out():
+    weights = DepthWeights.of([[0.0] * 5])
+    for of in (weights.images, weights.others):
         assert np.array(of).tolist() == [1.0] * 4

@@ -31,7 +31,7 @@ def test_thin_regions_are_smoothed_and_keep_their_energy(denoiser):
     where[11:13] = True
     light = np.random.default_rng(5).gamma(1.0, 1.0, (*size, 1)).astype(np.float32).repeat(3, axis=2)
     band = Shading(light * where[..., None], np.where(where, 1.0, 0.0).astype(np.float32))
-    (found,) = filter_spatially([geometry], [band], where, is_denoised=denoiser != "none")
+    (found,) = filter_spatially([geometry], [band], where, is_denoised=denoiser != "none", unit=1.0)
     assert found.color[where].std() < 0.5 * light[where].std()
     assert found.color[where].mean() == pytest.approx(light[where].mean(), rel=0.15)
 
@@ -42,7 +42,7 @@ def test_deviations_are_the_same_at_the_border_of_the_sampled_pixels():
     where[6:18, 4:20] = True
     grey = np.where(where[..., None], np.float32([0.5, 0.5, 0.5]), np.float32(0))
     aov = Shading(grey, np.where(where, np.float32(0.04), np.float32(0)))
-    (found,) = filter_spatially([geometry], [aov], where, is_denoised=True)
+    (found,) = filter_spatially([geometry], [aov], where, is_denoised=True, unit=1.0)
     np.testing.assert_allclose(found.deviation[where], DENOISED_SHARE * 0.2, rtol=2e-3)
 
 
@@ -52,7 +52,7 @@ def test_reflections_in_a_pane_have_no_noise_and_keep_their_energy(pane_scene, s
     renderer, camera, seen, virtual = pane_scene
     where = np.ones(seen.shape_index.shape, bool)
     aovs = [aov.to_image(where) for aov in specular_aovs(renderer, camera, spp)]
-    reflection, _ = filter_spatially(virtual, aovs, where, is_denoised=denoiser != "none")
+    reflection, _ = filter_spatially(virtual, aovs, where, is_denoised=denoiser != "none", unit=1.0)
     front = seen.shape_index == renderer.describe().shapes.index("front") + 1
     filtered, unfiltered = (aov.color[front].mean(dtype=float) for aov in (reflection, aovs[0]))
     assert filtered == pytest.approx(unfiltered, rel=0.02)

@@ -9,6 +9,7 @@ import drjit as dr
 
 from enfilade.arrays import Array3f, Bool
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
+from enfilade.methods.decoupled.path_depth import weight_after
 
 STREAM_SALT = 0x9E3779B9  # makes the jitter of lookups independent of the path's random numbers
 
@@ -26,7 +27,7 @@ class CacheQuery:
     weight : Array3f
         Contribution of irradiance over pi to the pixel sample; 0 where there is no diffuse lobe.
     bounces : UInt
-        Of the path before the point.
+        Of the path before the point, which count for its depth.
     sharp : tuple of Array3f
         Irradiance over pi by emitters with sharp shadows, where the images of the cache are soft.
     """
@@ -67,8 +68,9 @@ def query_hash_grid(
         return Array3f(0), Bool(where)
     at = query.position, query.normal, query.shape_index, query.width
     irradiance, is_found = cache.hash_grid.lookup(*at, offset, where)
-    share = cache.shares.of_others(query.bounces) if cache.shares else 1.0
-    return Array3f(dr.select(is_found, query.weight * share * irradiance, 0.0)), Bool(where & ~is_found)
+    weights = cache.depth_weights
+    scale = weight_after(weights.others, query.bounces) if weights else 1.0
+    return Array3f(dr.select(is_found, query.weight * scale * irradiance, 0.0)), Bool(where & ~is_found)
 
 
 def query_further(cache: IrradianceCache, query: CacheQuery, sampler: Any, jitter: Any) -> tuple[Any, Any]:
@@ -84,6 +86,7 @@ def query_further(cache: IrradianceCache, query: CacheQuery, sampler: Any, jitte
 
 
 def _reflected(cache: IrradianceCache, query: CacheQuery, irradiance: Any, is_known: Any) -> tuple[Any, Any]:
-    share = cache.shares.of_images(query.bounces) if cache.shares else 1.0
-    reflected = dr.select(is_known, query.weight * sum(query.sharp, share * irradiance), 0.0)
+    weights = cache.depth_weights
+    scale = weight_after(weights.images, query.bounces) if weights else 1.0
+    reflected = dr.select(is_known, query.weight * sum(query.sharp, scale * irradiance), 0.0)
     return Array3f(reflected), Bool(~is_known & query.is_needed)

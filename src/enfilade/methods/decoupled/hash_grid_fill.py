@@ -25,8 +25,8 @@ MAX_GATHER_SPP = 4  # final gather rays of each diffuse pixel of a prepass image
 def gather_spp(pixels: int) -> int:
     """Final gather rays of a pixel of a prepass image with so many pixels.
 
-    About as many in all at every size: the light of whole surfaces is uncertain, and that depends on their
-    total.
+    From 320x180 to 640x360 pixels about as many in all: the light of whole surfaces is uncertain, and that
+    depends on their total.
     """
     return min(max(round(LIGHT_PIXELS / pixels), 1), MAX_GATHER_SPP)
 

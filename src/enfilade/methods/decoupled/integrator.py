@@ -138,7 +138,7 @@ class Integrator:
         return Samples(self._reflected(cache, compact(path, path.lane), count, on_miss))
 
     def specular_radiance_at_edges(
-        self, aovs: UploadedImage, cache: IrradianceCache, path: Path, *, unit: float = 1.0
+        self, aovs: UploadedImage, cache: IrradianceCache, path: Path, *, unit: float
     ) -> Samples:
         """The same from filtered AOVs of the pixels' centres; traced where these do not show the surface.
 
@@ -149,7 +149,7 @@ class Integrator:
         cache, path
             As of :meth:`specular_radiance`.
         unit
-            Of the AOVs: radiance that is 1 after exposure.
+            Radiance that the AOVs store as 1.
 
         Returns
         -------
@@ -221,7 +221,7 @@ class Integrator:
         """
         found = dr.zeros(Array3f, count)
         if dr.width(path.lane):
-            _, irradiance, _ = self.kernels.estimate(cache.path_guide, cache.shares, path)
+            _, irradiance, _ = self.kernels.estimate(cache.path_guide, _other_weights(cache), path)
             scatter_add(found, irradiance, path.lane)
         return found
 
@@ -335,9 +335,14 @@ class Integrator:
         missing: Any = dr.compress(is_miss)
         if dr.width(missing):
             unknown = compact(missed.path, missing)
-            weight, irradiance, keys = self.kernels.estimate(cache.path_guide, cache.shares, unknown)
+            weight, irradiance, keys = self.kernels.estimate(cache.path_guide, _other_weights(cache), unknown)
             contributions.append((weight * irradiance, unknown.lane))
             if on_miss:
                 count = dr.width(missing)
                 on_miss([np.array(key)[:count] for key in keys], rows(irradiance)[:count])
         return contributions
+
+
+def _other_weights(cache: IrradianceCache) -> Any:
+    """Weights of irradiance that is in no image, by bounces (Float); None: all are 1."""
+    return cache.depth_weights.others if cache.depth_weights else None

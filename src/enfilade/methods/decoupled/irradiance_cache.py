@@ -14,7 +14,7 @@ from enfilade.kernels.estimate import GAUSSIAN_RADIUS_PX
 from enfilade.kernels.guiding import PathGuide
 from enfilade.kernels.rays import points_at
 from enfilade.methods.decoupled.hash_grid import HashGrid
-from enfilade.methods.decoupled.path_depth import DepthShares
+from enfilade.methods.decoupled.path_depth import DepthWeights
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.decoupled.surface_image import (
     MIN_FOUND_WEIGHT,
@@ -27,7 +27,7 @@ from enfilade.methods.decoupled.surface_image import (
 from enfilade.methods.decoupled.wavelet import guide_of, redistribute_fireflies, smooth_along
 from enfilade.records import Geometry, Mask
 
-MIN_COVERAGE = 0.02  # by default
+MIN_COVERAGE = 0.02  # bilinear weight of the pixels around a point, above which an image shows it
 FIREFLY = 2.0  # times the second brightest neighbour: brighter pixels are fireflies
 FIREFLY_LEVELS = 5  # of the wavelet that distributes their energy
 
@@ -51,8 +51,8 @@ class IrradianceCache:
         Of paths that estimate irradiance.
     min_coverage : float
         Bilinear weight of the pixels around a point that show its surface, above which the image does.
-    shares : DepthShares or None
-        Of paths that bounce off specular lobes before they meet the cache. None: all of it.
+    depth_weights : DepthWeights or None
+        Of cached irradiance after bounces off specular lobes. None: all are 1.
     """
 
     view: UploadedImage | None = None
@@ -62,7 +62,7 @@ class IrradianceCache:
     soft_only: bool = False
     path_guide: PathGuide | None = None
     min_coverage: float = MIN_COVERAGE
-    shares: DepthShares | None = None
+    depth_weights: DepthWeights | None = None
 
     @staticmethod
     def of(
@@ -74,12 +74,12 @@ class IrradianceCache:
         soft_only: bool = False,
         path_guide: PathGuide | None = None,
         min_coverage: float = MIN_COVERAGE,
-        shares: DepthShares | None = None,
+        depth_weights: DepthWeights | None = None,
     ) -> IrradianceCache:
         """A cache of some images with their weights."""
         own = tuple(opaque(float(weight)) for weight in weights)
         return IrradianceCache(
-            view, tuple(images), own, hash_grid, soft_only, path_guide, min_coverage, shares
+            view, tuple(images), own, hash_grid, soft_only, path_guide, min_coverage, depth_weights
         )
 
     def lookup_in_view(self, position: Any, normal: Any, shape_index: Any) -> tuple[Any, Any]:

@@ -1,8 +1,8 @@
 """Light of paths that end at the scene's ``max_depth``: behind mirrors, glass and gloss there is less of it.
 
 Cached irradiance has the light of paths that reach its surface as early as can be. A path that has bounced
-off specular lobes on its way there has fewer edges left. The share that is left then is much the same all
-over a scene; it is estimated by paths that are cut short.
+off specular lobes before ends earlier. The mean irradiance at each path depth, estimated by paths that end
+early, says how much of the light remains.
 """
 
 from __future__ import annotations
@@ -21,43 +21,50 @@ from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.records import Geometry
 from enfilade.renderer import MAX_PATH_DEPTH, LobeRenderer, PixelFilter, RandomKey
 
-PIXELS = 8192  # of a keyframe, from which a path each is cut short
+PIXELS = 8192  # of a keyframe, from which paths end early
+KEYFRAMES = 4  # of a shot, about
 DEPTHS = range(1, MAX_PATH_DEPTH + 1)
 
 
 @dataclass(frozen=True)
-class DepthShares:
-    """Shares of cached irradiance that are left after so many bounces, as lanes.
+class DepthWeights:
+    """Weights of cached irradiance after bounces: how much of it paths of limited depth bring.
 
     Attributes
     ----------
     images : Float
-        Of irradiance images, whose paths begin at the first surface, without sharp light.
+        Of irradiance images, by the number of bounces.
     others : Float
-        Of all other irradiance, whose paths begin at the second surface.
+        Of all other irradiance.
     """
 
     images: Any
     others: Any
 
-    def of_images(self, bounces: Any) -> Any:
-        """The share of irradiance images at a surface after bounces (UInt); Float."""
-        return dr.gather(Float, self.images, dr.minimum(UInt(bounces), MAX_PATH_DEPTH - 1))
+    @staticmethod
+    def of(light: Sequence[Sequence[float]]) -> DepthWeights:
+        """The weights for irradiance images, whose paths begin at the first surface, without sharp light.
 
-    def of_others(self, bounces: Any) -> Any:
-        """The share of all other irradiance; Float."""
-        return dr.gather(Float, self.others, dr.minimum(UInt(bounces), MAX_PATH_DEPTH - 1))
+        All other irradiance is that of paths that begin at the second surface.
+
+        Parameters
+        ----------
+        light
+            :func:`light_by_depth` of several keyframes.
+        """
+        soft, whole = _soft_and_whole(light)
+        return DepthWeights(_relative(soft, 0), _relative(whole, 1))
+
+    @staticmethod
+    def of_prepass(light: Sequence[Sequence[float]]) -> DepthWeights:
+        """The same for prepass images, which are as all other irradiance."""
+        _, whole = _soft_and_whole(light)
+        return DepthWeights(_relative(whole, 1), _relative(whole, 1))
 
 
-def depth_shares(light: Sequence[Sequence[Sequence[float]]], *, has_sharp_light: bool) -> DepthShares:
-    """The shares, from :func:`light_by_depth` of several keyframes."""
-    *by_depth, sharp = np.sum(light, axis=0) if len(light) else np.zeros(MAX_PATH_DEPTH + 1)
-    whole = np.array(by_depth)
-    soft = whole - sharp if has_sharp_light else whole
-    images, others = (
-        of / of[base] if of[base] > 0.0 else np.ones(MAX_PATH_DEPTH) for of, base in ((soft, 0), (whole, 1))
-    )
-    return DepthShares(*(lanes(np.clip(of, 0.0, 1.0).astype(np.float32)) for of in (images, others)))
+def weight_after(weights: Any, bounces: Any) -> Any:
+    """The weight (Float) after a number of bounces (UInt); weights: Float, one a number."""
+    return dr.gather(Float, weights, dr.minimum(UInt(bounces), MAX_PATH_DEPTH - 1))
 
 
 def light_by_depth(
@@ -68,7 +75,7 @@ def light_by_depth(
     *,
     paths_in_flight: int,
 ) -> tuple[list[float], RayCount]:
-    """Mean luminance of irradiance over pi, by the same paths cut short as if they began at each depth.
+    """Mean luminance of irradiance over pi, by the same paths ended as if they began at each depth.
 
     Parameters
     ----------
@@ -82,34 +89,53 @@ def light_by_depth(
     Returns
     -------
     light : list of float
-        One a depth, and as the last one that of emitters with sharp shadows.
+        Without sharp light, one a depth; then that of sharp light, which has the same at each. Multiplied by
+        the number of pixels with a diffuse lobe.
     count : RayCount
     """
     pixels = np.flatnonzero(geometry.has_diffuse).astype(np.uint32)
-    pixels = pixels[:: max(-(-len(pixels) // PIXELS), 1)]
+    chosen = pixels[np.linspace(0, len(pixels) - 1, min(len(pixels), PIXELS)).astype(np.intp)]
     has_sharp_light = renderer.has_sharp_light()
 
     def radiance(rays: Any, sampler: Any) -> Samples:
         point = renderer.intersect(rays, opaque_only=True)
-        found = [
+        soft = [
             sum(
-                renderer.estimate_diffuse(point, sampler.copy(), 1, guide, limited_as=depth),
+                renderer.estimate_diffuse(
+                    point, sampler.copy(), 1, guide, end_depth=depth, soft_only=has_sharp_light
+                ),
                 Array3f(0),
             )
             for depth in DEPTHS
         ]
         sharp = renderer.sharp_light(point, sampler.copy())[0] if has_sharp_light else Array3f(0)
-        return Samples((*found, Array3f(sharp + dr.zeros(Array3f, dr.width(sampler.seed)))))
+        return Samples((*soft, sharp + dr.zeros(Array3f, dr.width(sampler.seed))))
 
     estimate = Estimate(
         geometry.camera,
-        pixels,
+        chosen,
         radiance,
         paths_in_flight=paths_in_flight,
         pixel_filter=PixelFilter.CENTRE,
         random=random,
         layers=len(DEPTHS) + 1,
     )
+    if not len(chosen):
+        return [0.0] * (len(DEPTHS) + 1), estimate.count
     estimate.add(1)
-    means = [float(np.mean(of.color @ REC709_LUMINANCE)) if len(pixels) else 0.0 for of in estimate.shadings]
-    return means, estimate.count
+    means = [float(np.mean(of.color @ REC709_LUMINANCE, dtype=np.float64)) for of in estimate.shadings]
+    count = RayCount(estimate.count.rays * len(DEPTHS), estimate.count.dropped)
+    return [mean * len(pixels) for mean in means], count
+
+
+def _soft_and_whole(light: Sequence[Sequence[float]]) -> tuple[Any, Any]:
+    """Irradiance by depth, (MAX_PATH_DEPTH,), without sharp light and with it."""
+    *soft, sharp = np.sum(light, axis=0)
+    return np.array(soft), np.array(soft) + sharp
+
+
+def _relative(light: Any, depth: int) -> Any:
+    """Irradiance by depth over that of one depth, as lanes; 1 without light."""
+    if not light[depth] > 0.0:
+        return lanes(np.ones(len(light), np.float32))
+    return lanes(np.maximum(light / light[depth], 0.0).astype(np.float32))

@@ -7,14 +7,14 @@ from typing import Any
 
 import drjit as dr
 
-from enfilade.arrays import Array3f, Bool
+from enfilade.arrays import Array3f, Bool, UInt
 from enfilade.kernels.guiding import PathGuide
 from enfilade.kernels.replay import recorded
 from enfilade.methods.decoupled.cache_query import CacheQuery, query_further, query_hash_grid, query_view
 from enfilade.methods.decoupled.guiding import trace_probes
 from enfilade.methods.decoupled.hash_grid import LEVELS, entry_key
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
-from enfilade.methods.decoupled.path_depth import DepthShares
+from enfilade.methods.decoupled.path_depth import weight_after
 from enfilade.methods.decoupled.paths import Path
 from enfilade.methods.decoupled.surface_image import UploadedImage, lookup
 from enfilade.records import MIN_DIFFUSE_ALBEDO, SurfaceClass
@@ -137,7 +137,7 @@ class PathKernels:
             shape_index=point.surfaces.shape_index,
             width=path.width_at(point),
             weight=dr.select(is_diffuse, path.throughput * albedo, 0.0),
-            bounces=path.bounces,
+            bounces=path.depth,
             sharp=sharp,
         )
         reflected, is_miss = query_view(cache, query)
@@ -176,6 +176,8 @@ class PathKernels:
             spread=dr.maximum(path.spread, lobe_width),
             sampler=sampler,
             bounces=path.bounces + 1,
+            # Mitsuba's `volpath` does not count null interactions.
+            depth=path.depth + dr.select(sample.is_passed, UInt(0), UInt(1)),
             branch=path.branch,
         )
 
@@ -210,6 +212,7 @@ class PathKernels:
             spread=dr.maximum(path.spread, ENTRY_GATHER_WIDTH),
             sampler=sampler,
             bounces=path.bounces + 1,
+            depth=path.depth + 1,
             branch=path.branch,
         )
 
@@ -239,20 +242,25 @@ class PathKernels:
         return _keys(point, path), irradiance, Bool(is_diffuse & is_known), Bool(is_diffuse & ~is_known)
 
     def _estimate(
-        self, guide: PathGuide | None, shares: DepthShares | None, path: Path
+        self, guide: PathGuide | None, depth_weights: Any, path: Path
     ) -> tuple[Any, Any, tuple[Any, ...]]:
         """Path trace the irradiance at the next surface; also its weight, and its keys in the hash grid.
 
-        Its depth is that of a surface seen directly, or after one bounce, as of the irradiance in the cache:
-        a finite ``--max-depth`` does not cut it shorter behind several mirrors.
+        Its paths begin at the first surface, or at the second, as those of the irradiance in the cache. The
+        weight has what a ``max_depth`` leaves of it after further bounces.
         """
         sampler = path.sampler.fork(ESTIMATE_SALT)
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
         path_depth = 2 if path.bounce else 1
         direct, indirect = self._renderer.estimate_diffuse(point, sampler, path_depth, guide)
         irradiance = Array3f(direct + indirect)
-        share = shares.of_others(path.bounces) if shares else 1.0
-        return Array3f(path.throughput * share * point.surfaces.albedo), irradiance, _keys(point, path)
+        weight = Array3f(path.throughput * point.surfaces.albedo)
+        if depth_weights is not None:
+            scale = weight_after(depth_weights, path.depth)
+            weight *= scale
+            if path.bounce is None:  # in the hash grid it is that of a path after one bounce
+                irradiance *= dr.rcp(scale)
+        return weight, irradiance, _keys(point, path)
 
     def _terminate(self, path: Path) -> Any:
         """Path trace the specular lobes at the next surface to their end."""

@@ -32,6 +32,8 @@ class Path:
     sampler : PaddedSobolSampler
     bounces : UInt
         Made so far.
+    depth : UInt
+        Those of them that count where the scene limits the depth of paths.
     branch : UInt
         :class:`Branch` that it follows at the next interface.
     """
@@ -44,6 +46,7 @@ class Path:
     spread: Any
     sampler: Any
     bounces: Any
+    depth: Any
     branch: Any
 
     @property
@@ -73,6 +76,7 @@ def spawn(rays: Rays, sampler: Any, spread: float) -> Path:
         spread=dr.opaque(Float, spread, count),
         sampler=sampler,
         bounces=dr.opaque(UInt, 0, count),
+        depth=dr.opaque(UInt, 0, count),
         branch=dr.opaque(UInt, int(Branch.REFLECTED), count),
     )
     # Evaluate now: memory shared with NumPy can't be freed while a kernel is recorded.
@@ -94,6 +98,7 @@ def compact(path: Path, chosen: Any) -> Path:
         spread=dr.gather(Float, path.spread, index),
         sampler=dr.gather(PaddedSobolSampler, path.sampler, index),
         bounces=dr.gather(UInt, path.bounces, index),
+        depth=dr.gather(UInt, path.depth, index),
         branch=dr.gather(UInt, path.branch, index),
     )
     dr.make_opaque(taken)  # a literal would be another signature of the kernels

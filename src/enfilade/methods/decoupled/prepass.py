@@ -6,7 +6,7 @@ Heckbert 1992; Jensen 1996).
 
 from __future__ import annotations
 
-from enfilade.kernels.estimate import Samples
+from enfilade.kernels.estimate import RayCount, Samples
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.denoising import denoise_irradiance
 from enfilade.methods.decoupled.guiding import find_regions
@@ -39,13 +39,15 @@ def trace_prepass(shot: ShotContext, frame: int) -> Output:
         walk.random(frame, Purpose.PREPASS),
     )
     estimate.add(SPP)
-    by_depth, cut_short = light_by_depth(
-        renderer,
-        geometry,
-        guide,
-        walk.random(frame, Purpose.DEPTHS),
-        paths_in_flight=walk.settings[LimitSettings].paths_in_flight,
-    )
+    by_depth, ended = None, RayCount()
+    if frame in shot.depth_keyframes:
+        by_depth, ended = light_by_depth(
+            renderer,
+            geometry,
+            guide,
+            walk.random(frame, Purpose.DEPTHS),
+            paths_in_flight=walk.settings[LimitSettings].paths_in_flight,
+        )
     direct, indirect = (shading.to_image(where) for shading in estimate.shadings)
     image = IrradianceImage(direct, indirect, where)
     if (denoiser := shot.settings.denoiser) != "none":
@@ -55,8 +57,8 @@ def trace_prepass(shot: ShotContext, frame: int) -> Output:
         )
     count = estimate.count
     metadata = {
-        "rays": {"prepass": count.rays, "cut_short": cut_short.rays, "path_guide": guide_paths},
-        "dropped": count.dropped,
+        "rays": {"prepass": count.rays, "path_depth": ended.rays, "path_guide": guide_paths},
+        "dropped": (count + ended).dropped,
         "light_by_depth": by_depth,
         "regions": regions.to_json() if regions else [],
     }

@@ -49,7 +49,7 @@ class IrradianceImage:
 class SpecularAov:
     """Radiance reflected or transmitted by specular lobes, before temporal accumulation.
 
-    In units of the radiance that is 1 after exposure, for which half floats are precise.
+    In a unit of the shot, near the radiance that is shown, for which half floats are precise.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class SpecularAov:
 
     @staticmethod
     def of(color: F32, deviation: F32, unit: float) -> SpecularAov:
-        """The AOV of radiance (H, W, 3) and its deviation (H, W); `unit` is 1 after exposure."""
+        """The AOV of radiance (H, W, 3) and its deviation (H, W); `unit` is stored as 1."""
         scale = np.float32(1.0 / unit)
         return SpecularAov(to_half(scale * color), to_half(scale * deviation))
 

@@ -38,7 +38,7 @@ def shade(shot: ShotContext, frame: int) -> Output:
     provenance = _provenance(geometry, cache, seen, is_keyframe=frame in shot.keyframes)
     reflection, *others = specular.aovs
     transmission = others[0] if others else None
-    scale = np.float32(1.0 / shot.unit)
+    scale = np.float32(1.0 / shot.stored_unit)
     shaded = ShadedFrame(
         to_half(scale * diffuse_image.color),
         reflection,

@@ -24,7 +24,7 @@ from enfilade.methods.decoupled.image_store import DISOCCLUSION_IMAGES, PREPASS_
 from enfilade.methods.decoupled.integrator import Integrator
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache, is_covered, reproject_to
 from enfilade.methods.decoupled.light_camera import virtual_camera
-from enfilade.methods.decoupled.path_depth import DepthShares, depth_shares
+from enfilade.methods.decoupled.path_depth import KEYFRAMES, DepthWeights
 from enfilade.methods.decoupled.path_kernels import ENTRY_PX
 from enfilade.methods.decoupled.paths import Path, spawn
 from enfilade.methods.decoupled.reconstruction import ReconstructedEstimate
@@ -38,9 +38,10 @@ from enfilade.settings import DecoupledSettings, LimitSettings, ViewingSettings
 HASH_GRID_KEYFRAMES = 8  # nearest ones whose entries are looked up
 FADE = 0.25  # of the distance of the next keyframe, over which entries fade
 FADE_STEPS = 4  # of their weight: each uploads the hash grid again
+STORED_UNIT = 16.0  # exposed radiance that shaded frames store as 1
 MIN_WEIGHT = 1e-3  # of an image, which then counts only where no other shows the surface
 # Bilinear weight of the pixels above which prepass images show a point: less would continue surfaces behind
-# what hides them. Surfaces narrower than two pixels are not shown. (Of 0.02, 0.5, 0.9 and 0.97, on ATRIUM.)
+# what hides them. Narrow surfaces are shown near the centres of pixels alone. (Of 0.02, 0.5, 0.9, 0.97; ATRIUM.)
 PREPASS_COVERAGE = 0.9
 
 
@@ -102,6 +103,14 @@ class ShotContext:
     def unit(self) -> float:
         """Radiance that is 1 after exposure."""
         return float(2.0 ** -self.walk.settings[ViewingSettings].exposure_ev)
+
+    @property
+    def stored_unit(self) -> float:
+        """Radiance that shaded frames store as 1: half floats then end at a million times white.
+
+        A power of two, so that values are exact multiples.
+        """
+        return float(2.0 ** round(math.log2(STORED_UNIT * self.unit)))
 
     @property
     def white(self) -> float:
@@ -176,7 +185,7 @@ class ShotContext:
             view=images[0],
             path_guide=self._path_guide(near[0]),
             min_coverage=PREPASS_COVERAGE,
-            shares=replace(self.depth_shares, images=self.depth_shares.others),
+            depth_weights=self._prepass_weights,
         )
 
     def final_gather_cache(self, frame: int) -> IrradianceCache:
@@ -209,14 +218,27 @@ class ShotContext:
             view=reprojected,
             soft_only=self.renderer.has_sharp_light(),
             path_guide=self._path_guide(*nearest(self.walk.path, self.keyframes, frame, 1)),
-            shares=self.depth_shares,
+            depth_weights=self._depth_weights,
         )
 
+    @property
+    def depth_keyframes(self) -> list[int]:
+        """Keyframes from which light by path depth is estimated; none where the scene does not limit it."""
+        step = max(len(self.keyframes) // KEYFRAMES, 1)
+        return self.keyframes[::step] if self.renderer.has_depth_limit() else []
+
     @cached_property
-    def depth_shares(self) -> DepthShares:
-        """Shares of the light of the cache after bounces, from all keyframes of the shot."""
-        light = [self.inputs.metadata("prepass", k)["light_by_depth"] for k in self.keyframes]
-        return depth_shares(light, has_sharp_light=self.renderer.has_sharp_light())
+    def _depth_weights(self) -> DepthWeights | None:
+        light = self._light_by_depth()
+        return DepthWeights.of(light) if light else None
+
+    @cached_property
+    def _prepass_weights(self) -> DepthWeights | None:
+        light = self._light_by_depth()
+        return DepthWeights.of_prepass(light) if light else None
+
+    def _light_by_depth(self) -> list[list[float]]:
+        return [self.inputs.metadata("prepass", k)["light_by_depth"] for k in self.depth_keyframes]
 
     def _path_guide(self, keyframe: int) -> PathGuide | None:
         def make() -> PathGuide | None:

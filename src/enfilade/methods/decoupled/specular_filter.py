@@ -27,7 +27,7 @@ FIREFLY = 2.0  # times the brightest neighbour: brighter pixels are fireflies
 
 
 def filter_spatially(
-    virtual: Sequence[Geometry], aovs: Sequence[Shading], where: Mask, *, is_denoised: bool, unit: float = 1.0
+    virtual: Sequence[Geometry], aovs: Sequence[Shading], where: Mask, *, is_denoised: bool, unit: float
 ) -> list[SpecularAov]:
     """Denoise specular AOVs, or smooth them along the surfaces that are seen in them by the wavelet filter.
 
@@ -42,7 +42,7 @@ def filter_spatially(
     is_denoised
         Whether to use the denoiser.
     unit
-        Radiance that is 1 after exposure.
+        Radiance that is stored as 1.
 
     Returns
     -------
@@ -61,7 +61,7 @@ def filter_spatially(
     return [_filtered(g, aov, where, weights, unit) for g, aov in zip(surfaces, aovs, strict=True)]
 
 
-def with_edges(aov: SpecularAov, edges: Shading, where: Mask, unit: float = 1.0) -> SpecularAov:
+def with_edges(aov: SpecularAov, edges: Shading, where: Mask, *, unit: float) -> SpecularAov:
     """An AOV with other values at its edges, without deviation: other frames that differ count little there.
 
     Parameters
@@ -71,7 +71,7 @@ def with_edges(aov: SpecularAov, edges: Shading, where: Mask, unit: float = 1.0)
         Of shape (H, W).
     where : (H, W) bool
     unit
-        Radiance that is 1 after exposure.
+        Radiance that is stored as 1.
     """
     certain = SpecularAov.of(edges.color, np.zeros_like(edges.variance), unit)
     color = np.where(where[..., None], certain.color, aov.color)

@@ -94,7 +94,9 @@ def shade_specular(
     # Filter the AOVs along the surfaces that are seen in them.
     used = 1 + max((k for k, aov in enumerate(traced) if aov.color.any()), default=0)
     is_denoised = shot.settings.denoiser != "none"
-    aovs = filter_spatially(virtual[:used], traced[:used], where, is_denoised=is_denoised, unit=shot.unit)
+    aovs = filter_spatially(
+        virtual[:used], traced[:used], where, is_denoised=is_denoised, unit=shot.stored_unit
+    )
     del traced
 
     # Choose the edges: those in mirrors and panes, surfaces that centres miss, and those between surfaces
@@ -103,7 +105,7 @@ def shade_specular(
     has_visible_contrast = AdaptiveSampling.of(
         shot.walk, times=SPECULAR_CONTRAST, beneath=beneath
     ).has_visible_contrast
-    shown = np.float32(shot.unit) * np.sum([to_float(aov.color) for aov in aovs], axis=0)
+    shown = np.float32(shot.stored_unit) * np.sum([to_float(aov.color) for aov in aovs], axis=0)
     edges = in_mirrors | is_missed | (where & (is_edge | is_thin) & has_visible_contrast(shown))
     if not edges.any():
         return SpecularShading(aovs, nowhere, no_variance, count)
@@ -115,7 +117,10 @@ def shade_specular(
     layers = [of.to_image(within) for of in fine.shadings]
     if any(layer.color.any() for layer in layers[len(aovs) :]):  # transmission that is seen at edges alone
         aovs = [*aovs, *[black] * (SPECULAR_AOVS - len(aovs))]
-    aovs = [with_edges(aov, layer, refined, shot.unit) for aov, layer in zip(aovs, layers, strict=False)]
+    aovs = [
+        with_edges(aov, layer, refined, unit=shot.stored_unit)
+        for aov, layer in zip(aovs, layers, strict=False)
+    ]
     variance = np.where(refined, sum(layer.variance for layer in layers), no_variance)
     return SpecularShading(aovs, refined, variance, count + fine.count)
 
@@ -161,13 +166,13 @@ def _looked_up(
     """
     geometry = shot.walk.view(frame).geometry
     uploaded = upload_aovs(geometry, aovs, SPECULAR_AOVS, known)
-    colors = [np.float32(shot.unit) * to_float(aov.color) for aov in aovs]
+    colors = [np.float32(shot.stored_unit) * to_float(aov.color) for aov in aovs]
     black = [np.zeros_like(colors[0])] * (SPECULAR_AOVS - len(colors))
     return shot.reconstructed_estimate(
         geometry.camera,
         within,
         lambda rays, sampler: shot.integrator.specular_radiance_at_edges(
-            uploaded, cache, shot.spawn(frame, rays, sampler), unit=shot.unit
+            uploaded, cache, shot.spawn(frame, rays, sampler), unit=shot.stored_unit
         ),
         shot.walk.random(frame, Purpose.SPECULAR_EDGES),
         layers=SPECULAR_AOVS,

@@ -65,14 +65,14 @@ class TemporalAccumulation:
         """A frame whose specular AOVs are averaged over its window, with weights that fall linearly."""
         path, shaded = shot.walk.path, self._record(shot, frame)
         geometry, color = shot.walk.view(frame).geometry, to_float(shaded.diffuse)
-        white = shot.white / shot.unit  # in the units of shaded frames
+        unit, white = (of / shot.stored_unit for of in (shot.unit, shot.white))
         frames = window(path, path.shots()[shot.number], frame)
         weights = {f: 1.0 - abs(path.distance(f) - path.distance(frame)) / (REACH + 1) for f in frames}
         if np.any(shaded.provenance == Provenance.SPECULAR):
             aovs = {f: self._aovs(shot, f) for f in frames}
             for k, here in enumerate(aovs.pop(frame)):
                 neighbours = [(of[k], weights[f]) for f, of in aovs.items() if k < len(of)]
-                color = color + accumulate_temporally(geometry, here, neighbours, unit=1.0)
+                color = color + accumulate_temporally(geometry, here, neighbours, unit=unit)
 
         # Average refined pixels.
         if shaded.deviation.any():
@@ -81,10 +81,10 @@ class TemporalAccumulation:
             deviation = to_float(shaded.deviation)
             here = redisplayed(shown, color, deviation, where, white=white)
             neighbours = [(other, weights[f]) for f, other in displayed.items()]
-            color = accumulate_refined(geometry, color, here, neighbours, white=white, unit=1.0 / white)
+            color = accumulate_refined(geometry, color, here, neighbours, white=white, unit=unit / white)
 
         # Specular lobes that are a difference have negative samples: clip the sum.
-        return Frame(np.float32(shot.unit) * np.maximum(color, 0.0), shaded.provenance)
+        return Frame(np.float32(shot.stored_unit) * np.maximum(color, 0.0), shaded.provenance)
 
     def _displayed_image(self, shot: ShotContext, frame: int) -> UploadedImage:
         """A shaded frame as it is displayed, on the device."""
@@ -92,7 +92,7 @@ class TemporalAccumulation:
         def make() -> UploadedImage:
             shaded, virtual = self._record(shot, frame), self._virtual_geometry(shot, frame)
             deviation = to_float(shaded.deviation)
-            return upload_displayed(virtual, shaded.color, deviation, white=shot.white / shot.unit)
+            return upload_displayed(virtual, shaded.color, deviation, white=shot.white / shot.stored_unit)
 
         return self._displayed.get(frame, make)
 
@@ -201,11 +201,11 @@ def upload_displayed(
     virtual
         G-buffers of the frame with the virtual images of reflection, and of transmission.
     color : (H, W, 3) float32
-        Linear radiance.
+        Linear radiance, in the unit of shaded frames.
     deviation : (H, W) float32
         Standard deviation of the luminance.
     white
-        Radiance that the tone curve shows as white.
+        What the tone curve shows as white, in that unit.
     """
     reflected, transmitted = virtual
     is_pane = reflected.surface == SurfaceClass.TRANSPARENT
@@ -259,12 +259,12 @@ def accumulate_refined(
     geometry
         G-buffer of the frame.
     color : (H, W, 3) float32
-        Linear radiance of the frame.
+        Linear radiance of the frame, in the unit of shaded frames.
     here, others
         Of :func:`upload_displayed`: the refined pixels of the frame, and whole frames with weights relative
         to its own.
     white
-        Radiance that the tone curve shows as white.
+        What the tone curve shows as white, in that unit.
     unit
         Share of it that is 1 after exposure.
 

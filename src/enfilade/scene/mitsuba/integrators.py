@@ -45,18 +45,23 @@ def scene_integrator(scene: Any, max_depth: int) -> Any:
     return _limited(own, max_depth, _depths(own)[1])
 
 
-def shortened(integrator: Any, path_depth: int, limited_as: int | None = None) -> Any:
+def shortened(integrator: Any, path_depth: int, end_depth: int | None = None) -> Any:
     """The integrator for rays that continue paths of a depth; itself if its paths have no limit.
 
-    With `limited_as` paths end as those of that depth do, while Russian roulette is the same.
+    With `end_depth` paths end as those of that depth do, while Russian roulette is the same.
     """
-    ends = path_depth if limited_as is None else limited_as
+    ends = path_depth if end_depth is None else end_depth
     if integrator.class_name() not in PATH_TRACERS:
         return integrator
     max_depth, rr_depth = _depths(integrator)
     if max_depth >= UNLIMITED:
         return integrator
     return _limited(integrator, max(max_depth - ends, 0), max(rr_depth - path_depth, 1))
+
+
+def has_depth_limit(integrator: Any) -> bool:
+    """Whether a path tracer limits the depth of its paths."""
+    return _depths(integrator)[0] < UNLIMITED
 
 
 def why_inseparable(scene: Any, integrator: Any) -> str:

@@ -39,6 +39,7 @@ from enfilade.renderer import (
 from enfilade.scene.mitsuba.emitters import find_emitters, trace_photons
 from enfilade.scene.mitsuba.files import collected_warnings
 from enfilade.scene.mitsuba.integrators import (
+    has_depth_limit,
     ignored,
     is_volumetric,
     scene_integrator,
@@ -84,7 +85,7 @@ class MitsubaRenderer:
         self._integrator = scene_integrator(scene, max_depth)
         depths = range(1, MAX_PATH_DEPTH + 1)
         self._continued = {
-            (begin, end): shortened(self._integrator, begin, limited_as=end)
+            (begin, end): shortened(self._integrator, begin, end_depth=end)
             for begin, end in sorted({*zip(depths, depths, strict=True), *product([1], depths)})
         }
         # The medium around the camera is that of the scene's sensor; poses are those of the camera path.
@@ -171,6 +172,10 @@ class MitsubaRenderer:
     def _photons(self) -> Photons:
         return trace_photons(self._scene)
 
+    def has_depth_limit(self) -> bool:
+        """See :meth:`enfilade.renderer.LobeRenderer.has_depth_limit`."""
+        return has_depth_limit(self._integrator)
+
     def has_sharp_light(self) -> bool:
         """See :meth:`enfilade.renderer.LobeRenderer.has_sharp_light`."""
         return not self._transport.sharp_emitters.is_empty
@@ -209,11 +214,12 @@ class MitsubaRenderer:
         path_depth: int = 1,
         guide: PathGuide | None = None,
         *,
-        limited_as: int | None = None,
+        end_depth: int | None = None,
+        soft_only: bool = False,
     ) -> tuple[Any, Any]:
         """See :meth:`enfilade.renderer.LobeRenderer.estimate_diffuse`."""
-        sample = self._transport.sample_diffuse(point, sampler, guide=guide)
-        return self._transport.estimate(sample, sampler, path_depth, limited_as or path_depth)
+        sample = self._transport.sample_diffuse(point, sampler, soft_only=soft_only, guide=guide)
+        return self._transport.estimate(sample, sampler, path_depth, end_depth or path_depth)
 
     def estimate_specular(self, point: ShadingPoint, sampler: Any, path_depth: int = 1) -> tuple[Any, Any]:
         """See :meth:`enfilade.renderer.LobeRenderer.estimate_specular`."""

@@ -59,9 +59,9 @@ class LightTransport:
         emitter_pdf = dr.select(bounce.soft_only, apart, emitter_pdf)
         return Array3f(emitted * dr.select(bounce.is_delta, 1.0, mis_weight(bounce.pdf, emitter_pdf)))
 
-    def estimate(self, sample: BsdfSample, sampler: Any, path_depth: int, limited_as: int) -> tuple[Any, Any]:
+    def estimate(self, sample: BsdfSample, sampler: Any, path_depth: int, end_depth: int) -> tuple[Any, Any]:
         """Direct and indirect radiance of a sample: its path is continued by the path tracer."""
-        depths = path_depth, limited_as
+        depths = path_depth, end_depth
         found, is_valid = self._radiance(sample.rays, sampler, depths, sample.is_alive)
         # The path tracer adds the emission of the first hit unweighted: replace it by the weighted one.
         met, unweighted, weighted, is_rare = self._emission_along(sample)
