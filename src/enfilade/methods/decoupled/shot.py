@@ -41,7 +41,7 @@ FADE_STEPS = 4  # of their weight: each uploads the hash grid again
 STORED_UNIT = 16.0  # exposed radiance that shaded frames store as 1
 MIN_WEIGHT = 1e-3  # of an image, which then counts only where no other shows the surface
 # Bilinear weight of the pixels above which prepass images show a point: less would continue surfaces behind
-# what hides them. Narrow surfaces are shown near the centres of pixels alone. (Of 0.02, 0.5, 0.9, 0.97; ATRIUM.)
+# what hides them. Narrow surfaces are shown near the centres of pixels alone. (ATRIUM: 0.02, 0.5, 0.9, 0.97.)
 PREPASS_COVERAGE = 0.9
 
 
