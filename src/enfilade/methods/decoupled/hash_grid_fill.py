@@ -19,14 +19,13 @@ from enfilade.renderer import PixelFilter, Purpose
 
 SPECULAR_SPP = 4  # specular rays of each pixel of the light camera
 SEEN_SPP = 4  # camera rays of each pixel of the light camera
-MAX_GATHER_SPP = 4  # final gather rays of each diffuse pixel of a prepass image (ATRIUM, GALLERY, KITCHEN)
+MAX_GATHER_SPP = 2  # final gather rays of each diffuse pixel of a prepass image (ATRIUM, GALLERY, KITCHEN)
 
 
 def gather_spp(pixels: int) -> int:
     """Final gather rays of a pixel of a prepass image with so many pixels.
 
-    From 320x180 to 640x360 pixels about as many in all: the light of whole surfaces is uncertain, and that
-    depends on their total.
+    Larger frames need fewer: the light of whole surfaces is uncertain, and that depends on their total.
     """
     return min(max(round(LIGHT_PIXELS / pixels), 1), MAX_GATHER_SPP)
 

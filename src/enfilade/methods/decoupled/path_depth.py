@@ -21,8 +21,8 @@ from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.records import Geometry
 from enfilade.renderer import MAX_PATH_DEPTH, LobeRenderer, PixelFilter, RandomKey
 
-PIXELS = 8192  # of a keyframe, from which paths end early
-KEYFRAMES = 4  # of a shot, about
+PIXELS = 4096  # of a keyframe, from which paths end early
+KEYFRAMES = 2  # of a shot, or one more
 DEPTHS = range(1, MAX_PATH_DEPTH + 1)
 
 
