@@ -26,8 +26,8 @@ class CacheQuery:
         Of the path there, scene units.
     weight : Array3f
         Contribution of irradiance over pi to the pixel sample; 0 where there is no diffuse lobe.
-    bounces : UInt
-        Of the path before the point, which count for its depth.
+    depth : UInt
+        Bounces of the path before the point, as of :class:`Path`.
     sharp : tuple of Array3f
         Irradiance over pi by emitters with sharp shadows, where the images of the cache are soft.
     """
@@ -37,7 +37,7 @@ class CacheQuery:
     shape_index: Any
     width: Any
     weight: Any
-    bounces: Any
+    depth: Any
     sharp: Any
 
     @property
@@ -68,8 +68,7 @@ def query_hash_grid(
         return Array3f(0), Bool(where)
     at = query.position, query.normal, query.shape_index, query.width
     irradiance, is_found = cache.hash_grid.lookup(*at, offset, where)
-    weights = cache.depth_weights
-    scale = weight_after(weights.others, query.bounces) if weights else 1.0
+    scale = weight_after(cache.depth_weights.others, query.depth)
     return Array3f(dr.select(is_found, query.weight * scale * irradiance, 0.0)), Bool(where & ~is_found)
 
 
@@ -86,7 +85,6 @@ def query_further(cache: IrradianceCache, query: CacheQuery, sampler: Any, jitte
 
 
 def _reflected(cache: IrradianceCache, query: CacheQuery, irradiance: Any, is_known: Any) -> tuple[Any, Any]:
-    weights = cache.depth_weights
-    scale = weight_after(weights.images, query.bounces) if weights else 1.0
+    scale = weight_after(cache.depth_weights.images, query.depth)
     reflected = dr.select(is_known, query.weight * sum(query.sharp, scale * irradiance), 0.0)
     return Array3f(reflected), Bool(~is_known & query.is_needed)

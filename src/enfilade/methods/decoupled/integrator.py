@@ -36,9 +36,8 @@ from enfilade.renderer import Branch, LobeRenderer
 SPECULAR_AOVS = 2  # reflection, transmission
 JITTER = 3.0  # range of lookups in the hash grid, in widths of an entry
 
-OnMiss = Callable[
-    [list[npt.NDArray[np.uint64]], F32], None
-]  # keys by level and above, and irradiance over pi (N, 3)
+# Receives keys by level, and one above, and irradiance over pi (N, 3).
+OnMiss = Callable[[list[npt.NDArray[np.uint64]], F32], None]
 
 
 @dataclass(frozen=True)
@@ -221,7 +220,7 @@ class Integrator:
         """
         found = dr.zeros(Array3f, count)
         if dr.width(path.lane):
-            _, irradiance, _ = self.kernels.estimate(cache.path_guide, _other_weights(cache), path)
+            _, irradiance, _ = self.kernels.estimate(cache.path_guide, cache.depth_weights.others, path)
             scatter_add(found, irradiance, path.lane)
         return found
 
@@ -335,14 +334,11 @@ class Integrator:
         missing: Any = dr.compress(is_miss)
         if dr.width(missing):
             unknown = compact(missed.path, missing)
-            weight, irradiance, keys = self.kernels.estimate(cache.path_guide, _other_weights(cache), unknown)
+            weight, irradiance, keys = self.kernels.estimate(
+                cache.path_guide, cache.depth_weights.others, unknown
+            )
             contributions.append((weight * irradiance, unknown.lane))
             if on_miss:
                 count = dr.width(missing)
                 on_miss([np.array(key)[:count] for key in keys], rows(irradiance)[:count])
         return contributions
-
-
-def _other_weights(cache: IrradianceCache) -> Any:
-    """Weights of irradiance that is in no image, by bounces (Float); None: all are 1."""
-    return cache.depth_weights.others if cache.depth_weights else None

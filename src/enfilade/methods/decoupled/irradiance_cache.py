@@ -14,7 +14,7 @@ from enfilade.kernels.estimate import GAUSSIAN_RADIUS_PX
 from enfilade.kernels.guiding import PathGuide
 from enfilade.kernels.rays import points_at
 from enfilade.methods.decoupled.hash_grid import HashGrid
-from enfilade.methods.decoupled.path_depth import DepthWeights
+from enfilade.methods.decoupled.path_depth import UNWEIGHTED, DepthWeights
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.decoupled.surface_image import (
     MIN_FOUND_WEIGHT,
@@ -51,8 +51,8 @@ class IrradianceCache:
         Of paths that estimate irradiance.
     min_coverage : float
         Bilinear weight of the pixels around a point that show its surface, above which the image does.
-    depth_weights : DepthWeights or None
-        Of cached irradiance after bounces off specular lobes. None: all are 1.
+    depth_weights : DepthWeights
+        Of cached irradiance after bounces off specular lobes.
     """
 
     view: UploadedImage | None = None
@@ -62,7 +62,7 @@ class IrradianceCache:
     soft_only: bool = False
     path_guide: PathGuide | None = None
     min_coverage: float = MIN_COVERAGE
-    depth_weights: DepthWeights | None = None
+    depth_weights: DepthWeights = UNWEIGHTED
 
     @staticmethod
     def of(
@@ -74,7 +74,7 @@ class IrradianceCache:
         soft_only: bool = False,
         path_guide: PathGuide | None = None,
         min_coverage: float = MIN_COVERAGE,
-        depth_weights: DepthWeights | None = None,
+        depth_weights: DepthWeights = UNWEIGHTED,
     ) -> IrradianceCache:
         """A cache of some images with their weights."""
         own = tuple(opaque(float(weight)) for weight in weights)

@@ -32,14 +32,14 @@ class DepthWeights:
 
     Attributes
     ----------
-    images : Float
-        Of irradiance images, by the number of bounces.
-    others : Float
+    images : Float or None
+        Of irradiance images, by the number of bounces. None: all are 1.
+    others : Float or None
         Of all other irradiance.
     """
 
-    images: Any
-    others: Any
+    images: Any = None
+    others: Any = None
 
     @staticmethod
     def of(light: Sequence[Sequence[float]]) -> DepthWeights:
@@ -50,20 +50,29 @@ class DepthWeights:
         Parameters
         ----------
         light
-            :func:`light_by_depth` of several keyframes.
+            :func:`light_by_depth` of several keyframes. Without any, all weights are 1.
         """
+        if not light:
+            return UNWEIGHTED
         soft, whole = _soft_and_whole(light)
         return DepthWeights(_relative(soft, 0), _relative(whole, 1))
 
     @staticmethod
     def of_prepass(light: Sequence[Sequence[float]]) -> DepthWeights:
         """The same for prepass images, which are as all other irradiance."""
+        if not light:
+            return UNWEIGHTED
         _, whole = _soft_and_whole(light)
         return DepthWeights(_relative(whole, 1), _relative(whole, 1))
 
 
+UNWEIGHTED = DepthWeights()
+
+
 def weight_after(weights: Any, bounces: Any) -> Any:
-    """The weight (Float) after a number of bounces (UInt); weights: Float, one a number."""
+    """The weight (Float) after a number of bounces (UInt); `weights` are those of :class:`DepthWeights`."""
+    if weights is None:
+        return Float(1)
     return dr.gather(Float, weights, dr.minimum(UInt(bounces), MAX_PATH_DEPTH - 1))
 
 

@@ -137,7 +137,7 @@ class PathKernels:
             shape_index=point.surfaces.shape_index,
             width=path.width_at(point),
             weight=dr.select(is_diffuse, path.throughput * albedo, 0.0),
-            bounces=path.depth,
+            depth=path.depth,
             sharp=sharp,
         )
         reflected, is_miss = query_view(cache, query)
@@ -254,13 +254,10 @@ class PathKernels:
         path_depth = 2 if path.bounce else 1
         direct, indirect = self._renderer.estimate_diffuse(point, sampler, path_depth, guide)
         irradiance = Array3f(direct + indirect)
-        weight = Array3f(path.throughput * point.surfaces.albedo)
-        if depth_weights is not None:
-            scale = weight_after(depth_weights, path.depth)
-            weight *= scale
-            if path.bounce is None:  # in the hash grid it is that of a path after one bounce
-                irradiance *= dr.rcp(scale)
-        return weight, irradiance, _keys(point, path)
+        scale = weight_after(depth_weights, path.depth)
+        if path.bounce is None:  # in the hash grid it is that of a path after one bounce
+            irradiance *= dr.rcp(scale)
+        return Array3f(path.throughput * point.surfaces.albedo * scale), irradiance, _keys(point, path)
 
     def _terminate(self, path: Path) -> Any:
         """Path trace the specular lobes at the next surface to their end."""

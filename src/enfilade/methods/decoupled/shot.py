@@ -228,14 +228,12 @@ class ShotContext:
         return self.keyframes[::step] if self.renderer.has_depth_limit() else []
 
     @cached_property
-    def _depth_weights(self) -> DepthWeights | None:
-        light = self._light_by_depth()
-        return DepthWeights.of(light) if light else None
+    def _depth_weights(self) -> DepthWeights:
+        return DepthWeights.of(self._light_by_depth())
 
     @cached_property
-    def _prepass_weights(self) -> DepthWeights | None:
-        light = self._light_by_depth()
-        return DepthWeights.of_prepass(light) if light else None
+    def _prepass_weights(self) -> DepthWeights:
+        return DepthWeights.of_prepass(self._light_by_depth())
 
     def _light_by_depth(self) -> list[list[float]]:
         return [self.inputs.metadata("prepass", k)["light_by_depth"] for k in self.depth_keyframes]
