@@ -115,83 +115,29 @@ class Viewing:
         return replace(self, width_px=width_px, height_px=height_px, diagonal_m=diagonal_m)
 
 
-@dataclass(frozen=True)
-class Display:
-    """A screen at the distance from which it is usually looked at; images stand on it pixel for pixel.
-
-    Attributes
-    ----------
-    name : str
-        Of the preset.
-    width_px, height_px : int
-        Of the whole screen.
-    diagonal_m : float
-        Of the whole screen, metres.
-    distance_m : float
-        From the eye, metres.
-    peak_cd_m2, black_cd_m2 : float
-        Luminance of white and of black, reflected room light included, cd/m2.
-    text : str
-        What it stands for.
-    persistence : float
-        See :class:`Viewing`.
-    """
-
-    name: str
-    width_px: int
-    height_px: int
-    diagonal_m: float
-    distance_m: float
-    peak_cd_m2: float
-    black_cd_m2: float
-    text: str
-    persistence: float = 1.0
-
-    def viewing(self, width_px: int, height_px: int, fps: float) -> Viewing:
-        """Conditions for an image of a size, of which each pixel is one of the screen.
-
-        Raises
-        ------
-        InputError
-            See :class:`Viewing`.
-        """
-        screen = Viewing(
-            self.width_px,
-            self.height_px,
-            diagonal_m=self.diagonal_m,
-            distance_m=self.distance_m,
-            fps=fps,
-            peak_cd_m2=self.peak_cd_m2,
-            black_cd_m2=self.black_cd_m2,
-            persistence=self.persistence,
-        )
-        return screen.cropped(width_px, height_px)
+# Screens at the distance from which they are usually looked at, and what they stand for. Sizes are those of
+# common devices. Distances: 0.6 m at a desk (ISO 9241-303 asks for 0.4 m or more), three picture heights
+# before a television (ITU-R BT.2022), half a cinema's length. Luminances: typical settings, the office's
+# reflections in the black; the cinema's 48 cd/m2 are SMPTE ST 431-1's.
+DISPLAYS = {
+    "paper": (Viewing(640, 480, 0.25, 0.5, 30.0, 100.0, 0.1, 0.05), "the paper's tube (§6), 28 px/deg"),
+    "desktop-24-fhd": (Viewing(1920, 1080, 0.61, 0.6, 30.0, 200.0, 0.3), "24 inch monitor, in an office"),
+    "desktop-27-4k": (Viewing(3840, 2160, 0.686, 0.6, 30.0, 250.0, 0.3), "27 inch monitor, in an office"),
+    "laptop-14": (Viewing(1920, 1200, 0.356, 0.5, 30.0, 250.0, 0.4), "14 inch laptop, in an office"),
+    "phone": (Viewing(2532, 1170, 0.155, 0.35, 30.0, 450.0, 0.5), "6.1 inch phone in the hand, indoors"),
+    "tv-55-4k": (Viewing(3840, 2160, 1.397, 2.05, 30.0, 250.0, 0.1), "55 inch television, in the evening"),
+    "cinema": (Viewing(4096, 2160, 13.6, 12.0, 30.0, 48.0, 0.024), "12 m wide screen, middle row, dark"),
+}  # fmt: skip
 
 
-# Sizes are those of common devices. Distances: 0.6 m at a desk (ISO 9241-303 asks for 0.4 m or more), three
-# picture heights before a television (ITU-R BT.2022), half a cinema's length. Luminances: typical settings,
-# the office's reflections in the black; the cinema's 48 cd/m2 are SMPTE ST 431-1's.
-DISPLAYS = (
-    Display("paper", 640, 480, 0.25, 0.5, 100.0, 0.1, "the paper's tube (§6), 28 pixels per degree", 0.05),
-    Display("desktop-24-fhd", 1920, 1080, 0.61, 0.6, 200.0, 0.3, "24 inch monitor, in an office"),
-    Display("desktop-27-4k", 3840, 2160, 0.686, 0.6, 250.0, 0.3, "27 inch monitor, in an office"),
-    Display("laptop-14", 1920, 1200, 0.356, 0.5, 250.0, 0.4, "14 inch laptop, in an office"),
-    Display("phone", 2532, 1170, 0.155, 0.35, 450.0, 0.5, "6.1 inch phone in the hand, indoors"),
-    Display("tv-55-4k", 3840, 2160, 1.397, 2.05, 250.0, 0.1, "55 inch television, in the evening"),
-    Display("cinema", 4096, 2160, 13.6, 12.0, 48.0, 0.024, "12 m wide screen, middle row, dark"),
-)  # fmt: skip
-
-
-def display_named(name: str) -> Display:
-    """Display of a preset.
+def display_named(name: str) -> Viewing:
+    """Viewing conditions of a preset, for an image that fills the screen at 30 frames per second.
 
     Raises
     ------
     InputError
         There is none of that name.
     """
-    for display in DISPLAYS:
-        if display.name == name:
-            return display
-    known = ", ".join(display.name for display in DISPLAYS)
-    raise InputError(f"unknown display {name!r}; known are: {known}")
+    if name not in DISPLAYS:
+        raise InputError(f"unknown display {name!r}; known are: {', '.join(DISPLAYS)}")
+    return DISPLAYS[name][0]

@@ -146,10 +146,10 @@ def test_what_help_lists_is_what_there_is(run):
     output = " ".join(run("compare", "--help").output.split())
     listed = run("compare", "--display", "list")
     assert listed.exit_code == 0
-    for display in DISPLAYS:
-        assert display.name in output
-        assert display.name in listed.stdout
-        assert display.text in listed.stdout
+    for name, (_display, text) in DISPLAYS.items():
+        assert name in output
+        assert name in listed.stdout
+        assert text in listed.stdout
 
 
 def test_numbers_win_over_a_display(run, folders, tmp_path):

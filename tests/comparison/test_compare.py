@@ -167,8 +167,7 @@ def test_a_display_shows_pixel_for_pixel(sequence):
     folder = sequence("a", [textured()])
     display = display_named("desktop-24-fhd")
     found = compared(folder, folder, display=display)
-    whole = display.viewing(1920, 1080, 30.0)
-    assert found.viewing.pixels_per_degree == pytest.approx(whole.pixels_per_degree)
+    assert found.viewing.pixels_per_degree == pytest.approx(display.pixels_per_degree)
     assert found.viewing.peak_cd_m2 == 200.0
 
 

@@ -1,4 +1,4 @@
-"""Twin of `enfilade.methods.paper.convolve`: one pixel and one tap at a time, float64."""
+"""Twin of `enfilade.methods.paper.spatial_filter`: one pixel and one tap at a time, float64."""
 
 import math
 

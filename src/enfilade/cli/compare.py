@@ -29,18 +29,17 @@ if TYPE_CHECKING:
     from enfilade.comparison.compare import Mode
     from enfilade.comparison.motion import FlowChoice
     from enfilade.reports.heatmap import HeatmapPainter
-    from enfilade.viewing import Display, Viewing
+    from enfilade.viewing import Viewing
 
 
 def _list_displays(ctx: click.Context, _parameter: click.Parameter, value: str | None) -> str | None:
     if value == "list" and not ctx.resilient_parsing:
         from enfilade.viewing import DISPLAYS
 
-        for d in DISPLAYS:
-            density = d.viewing(d.width_px, d.height_px, 30.0).pixels_per_degree
+        for name, (d, text) in DISPLAYS.items():
             click.echo(
-                f"{d.name:<16}{d.width_px:>5}x{d.height_px:<5}{d.diagonal_m:>6g} m from {d.distance_m:>4g} m,"
-                f"{density:>6.1f} px/deg, {d.peak_cd_m2:>3g} and {d.black_cd_m2:g} cd/m2  {d.text}"
+                f"{name:<16}{d.width_px:>5}x{d.height_px:<5}{d.diagonal_m:>6g} m from {d.distance_m:>4g} m,"
+                f"{d.pixels_per_degree:>6.1f} px/deg, {d.peak_cd_m2:>3g} and {d.black_cd_m2:g} cd/m2  {text}"
             )
         ctx.exit()
     return value
@@ -191,7 +190,7 @@ def _options(
     )
 
 
-def _display(ctx: click.Context, name: str, viewing: ViewingSettings) -> Display:
+def _display(ctx: click.Context, name: str, viewing: ViewingSettings) -> Viewing:
     from enfilade.viewing import display_named
 
     numbers = given_in(ctx, ViewingSettings) - {"exposure_ev", "white"}

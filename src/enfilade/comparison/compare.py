@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal, TypeAlias, get_args
 
@@ -21,7 +21,7 @@ from enfilade.metric import Aqm, Comparison, SequenceAqm
 from enfilade.monitor import Monitor
 from enfilade.records import F32
 from enfilade.settings import MetricSettings, ViewingSettings
-from enfilade.viewing import Display, Viewing
+from enfilade.viewing import Viewing
 
 Mode: TypeAlias = Literal["modern", "paper"]
 
@@ -61,7 +61,7 @@ class CompareOptions:
     metric
         Eye movements, and the slope of masking in the paper's mode.
     display
-        Replaces `viewing`: images stand pixel for pixel on a display.
+        Replaces `viewing`: a screen, of whose pixels each shows one of the image.
     mode
         Of the metric: ``modern`` or ``paper``.
     flow
@@ -84,7 +84,7 @@ class CompareOptions:
 
     viewing: ViewingSettings = field(default_factory=ViewingSettings)
     metric: MetricSettings = field(default_factory=MetricSettings)
-    display: Display | None = None
+    display: Viewing | None = None
     mode: Mode = "modern"
     flow: FlowChoice = "auto"
     fps: float | None = None
@@ -100,7 +100,7 @@ class CompareOptions:
     def conditions(self, size: tuple[int, int], fps: float) -> Viewing:
         """Viewing conditions of an image of a size."""
         if self.display is not None:
-            return self.display.viewing(*size, fps)
+            return replace(self.display, fps=fps).cropped(*size)
         return self.viewing.conditions(*size, fps)
 
 

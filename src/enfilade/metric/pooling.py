@@ -40,7 +40,7 @@ class Pool:
     """
 
     def __init__(self, levels: int, valid: Mask, exponent: float) -> None:
-        self._levels, self._valid, self._exponent = levels, valid, exponent
+        self._valid, self._exponent = valid, exponent
         self._area = None if valid.all() else Pyramid(valid.astype(np.float32))
         self._sums: dict[bool, dict[int, F32]] = {False: {}, True: {}}
         self._band_sums = {kind: [0.0] * levels for kind in self._sums}

@@ -31,7 +31,6 @@ class DeliveredFrame:
 
     Attributes
     ----------
-    number : int
     color : (H, W, 3) float32
         Linear Rec.709.
     provenance : (H, W) uint8 or None
@@ -39,7 +38,6 @@ class DeliveredFrame:
     flow : Flow or None
     """
 
-    number: int
     color: F32
     provenance: U8 | None
     flow: Flow | None
@@ -129,7 +127,7 @@ class ReportedRun:
             raise ImageError(f"{file} holds no image of {size[1]}x{size[0]} pixels")
         provenance = layers.get("provenance")
         known = None if provenance is None else provenance.astype(np.uint8)
-        return DeliveredFrame(number, color.astype(np.float32), known, self._flow(index, layers))
+        return DeliveredFrame(color.astype(np.float32), known, self._flow(index, layers))
 
     def _imported(self, job: dict[str, Any]) -> ImportedScene | None:
         """The imported scene of the job; None where it was not imported, or is not there."""

@@ -12,8 +12,15 @@ IRRADIANCE_SCALE = 2  # width and height of irradiance images over those of the 
 
 
 def light_camera(camera: Camera) -> Camera:
-    """The camera of the prepass: the same view at a whole fraction of its size, or itself."""
-    return reduced(camera, light_reduction(camera.width * camera.height))
+    """The camera of the prepass: the same view at a whole fraction of its size, or itself.
+
+    The height is rounded down; the width is rounded up, by the aspect: the outermost columns are in view.
+    """
+    factor = light_reduction(camera.width * camera.height)
+    if factor == 1:
+        return camera
+    height = max(camera.height // factor, 1)
+    return replace(camera, width=-(-camera.width * height // camera.height), height=height)
 
 
 def irradiance_camera(camera: Camera) -> Camera:
@@ -38,14 +45,3 @@ def virtual_camera(camera: Camera) -> Camera:
 def light_reduction(pixels: int) -> int:
     """Width and height of a frame of so many pixels over those of its light camera."""
     return max(round(math.sqrt(pixels / LIGHT_PIXELS)), 1)
-
-
-def reduced(camera: Camera, factor: int) -> Camera:
-    """A camera with width and height divided by a factor, which sees the whole frame; itself where that is 1.
-
-    The height is rounded down; the width is rounded up, by the aspect: the outermost columns are in view.
-    """
-    if factor == 1:
-        return camera
-    height = max(camera.height // factor, 1)
-    return replace(camera, width=-(-camera.width * height // camera.height), height=height)

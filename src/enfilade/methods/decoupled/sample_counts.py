@@ -24,21 +24,10 @@ def irradiance_spp(settings: DecoupledSettings, keyframes: float) -> int:
     keyframes
         Of the shot.
     """
-    spp = IRRADIANCE_PATHS / math.sqrt(settings.quality) / averaged_images(keyframes)
+    # Accumulation weighs distant images less: their mean has the noise of half as many of equal weight.
+    averaged = max(min(keyframes, 2 * ACCUMULATED + 1) / 2.0, 1.0)
+    spp = IRRADIANCE_PATHS / math.sqrt(settings.quality) / averaged
     return settings.irradiance_spp or max(round(spp), MIN_IRRADIANCE_SPP)
-
-
-def averaged_images(keyframes: float) -> float:
-    """Number of irradiance images of equal weight whose mean has the noise of the accumulated ones.
-
-    Accumulation weighs distant images less: half of them count.
-
-    Parameters
-    ----------
-    keyframes
-        Of the shot.
-    """
-    return max(min(keyframes, 2 * ACCUMULATED + 1) / 2.0, 1.0)
 
 
 def specular_spp(settings: DecoupledSettings, frames: float) -> int:

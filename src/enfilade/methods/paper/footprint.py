@@ -11,8 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from enfilade.methods.paper.convolve import SIGMAS
-from enfilade.methods.paper.spatial_filter import reconstruct
+from enfilade.methods.paper.spatial_filter import SIGMAS, reconstruct
 from enfilade.records import F32, Halves, Mask, Warped
 
 # Variance along an axis, square pixels: with that of the filter of §5 at rest (1/4), a Gaussian of one pixel.

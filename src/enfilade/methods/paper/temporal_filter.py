@@ -11,7 +11,7 @@ import drjit as dr
 from enfilade.arrays import Array2f, Array3f, Bool, Float, UInt, image, lanes, opaque
 from enfilade.kernels.bilinear import sample
 from enfilade.kernels.rays import pixel_centres
-from enfilade.methods.paper.convolve import SIGMAS
+from enfilade.methods.paper.spatial_filter import SIGMAS
 from enfilade.methods.paper.support import COVERED_PX, TemporalLimits
 from enfilade.records import F32, Flow, Geometry
 from enfilade.settings import AntialiasSettings

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from enfilade.arrays import image, lanes
-from enfilade.methods.paper.convolve import blur_axis
-from enfilade.methods.paper.spatial_filter import reconstruct
+from enfilade.methods.paper.spatial_filter import blur_axis, reconstruct
 from twins.blur import blurred, blurred_rows
 
 H, W = 21, 26
