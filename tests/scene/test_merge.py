@@ -236,12 +236,15 @@ def test_textures_of_a_shape_stay_its_own(tmp_path):
     assert members(merge_meshes(load_scene(file))) == [[1, 3, 4], [2, 5], [6], [7], [8], [9]]
 
 
-def test_a_mesh_without_triangles_is_refused(tmp_path):
+@pytest.mark.parametrize("is_instanced", [False, True])
+def test_a_mesh_without_triangles_is_refused(tmp_path, is_instanced):
     vertices = "element vertex 0\nproperty float x\nproperty float y\nproperty float z\n"
     faces = "element face 0\nproperty list uchar int vertex_indices\n"
     (tmp_path / "empty.ply").write_text(f"ply\nformat ascii 1.0\n{vertices}{faces}end_header\n")
     empty = '<shape type="ply" id="void"><string name="filename" value="empty.ply"/>'
     empty += '<boolean name="face_normals" value="true"/></shape>'
+    if is_instanced:
+        empty = f'<shape type="shapegroup" id="g">{empty}</shape><shape type="instance"><ref id="g"/></shape>'
     file = tmp_path / "scene.xml"
     file.write_text(f'<scene version="3.0.0">{empty}</scene>')
     with pytest.raises(SceneError, match="the mesh void has no triangles"):

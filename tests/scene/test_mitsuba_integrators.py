@@ -6,11 +6,12 @@ import pytest
 from enfilade.arrays import Array3f, rows
 from enfilade.errors import SceneError
 from enfilade.renderer import Rays
-from support.mitsuba_scene import DIFFUSE, opened, placed, veil
+from support.mitsuba_scene import DIFFUSE, HOLES, opened, placed, veil, write_holes
 
 HIDDEN = '<integrator type="{}"><boolean name="hide_emitters" value="true"/></integrator>'
 SPOT = '<emitter type="spot"/>'
 THREE = '<integer name="max_depth" value="3"/>'
+BUMPS = HOLES.format("bumps", "bilinear")
 FOG = '<medium type="homogeneous" name="interior"/>'
 
 
@@ -38,9 +39,12 @@ def of_integrator(folder, integrator, inside=DIFFUSE):
         (f'<integrator type="volpath"/>{SPOT}', DIFFUSE, ""),
         (f'<integrator type="volpath"/>{SPOT}', '<bsdf type="thindielectric"/>', ""),
         (f'<integrator type="path"/>{SPOT}', '<bsdf type="thindielectric"/>', ""),
+        ("", f'<bsdf type="mask"><bsdf type="bumpmap">{BUMPS}{DIFFUSE}</bsdf></bsdf>', ""),
+        ("", f'<bsdf type="bumpmap">{BUMPS}<bsdf type="mask">{DIFFUSE}</bsdf></bsdf>', "contains a cut-out"),
     ],
 )  # fmt: skip
 def test_why_lobes_are_inseparable(tmp_path, integrator, inside, words):
+    write_holes(tmp_path)
     why = opened(of_integrator(tmp_path, integrator, inside)).why_inseparable()
     assert (words in why) if words else (why == "")
 

@@ -8,7 +8,6 @@ from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.methods.decoupled import hash_grid_entries as module
 from enfilade.methods.decoupled.hash_grid import LEVELS, SIZE_MASK, entry_key
 from enfilade.methods.decoupled.hash_grid_entries import MAX_ERROR, MIN_SAMPLES, Entries
-from enfilade.methods.decoupled.hash_grid_fill import gather_spp
 
 UP = np.float32([[0.0, 0.0, 1.0]])
 
@@ -276,13 +275,6 @@ def test_lanes_that_are_not_looked_up_find_nothing():
     light, is_hit = (np.array(v) for v in grid.lookup(*at, where=Bool([True, False])))
     assert is_hit.tolist() == [True, False]
     np.testing.assert_array_equal(light, [[1.0, 0.0]] * 3)
-
-
-@pytest.mark.parametrize(
-    ("width", "height", "spp"), [(64, 36, 2), (320, 180, 2), (480, 270, 2), (640, 360, 1), (944, 528, 1)]
-)
-def test_larger_frames_have_fewer_gather_rays_a_pixel_and_no_pixel_has_none(width, height, spp):
-    assert gather_spp(width * height) == spp
 
 
 def test_entries_of_fractional_weight_are_judged_with_their_group():

@@ -73,11 +73,13 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
     )
     seen.add(SEEN_SPP)
 
-    # Gather at the diffuse pixels of the prepass image.
+    # Gather at the diffuse pixels of the prepass image. Final gathers look up the hash grid before other
+    # prepass images, so that it needs the light of what these show, too.
+    own = replace(cache, images=(), weights=())
     gathered = shot.estimate(
         geometry.camera,
         geometry.has_diffuse,
-        lambda rays, sampler: shot.integrator.final_gather(cache, shot.spawn(frame, rays, sampler), collect),
+        lambda rays, sampler: shot.integrator.final_gather(own, shot.spawn(frame, rays, sampler), collect),
         walk.random(frame, Purpose.PREPASS_HASH_GRID),
     )
     gathered.add(gather_spp(camera.width * camera.height))

@@ -10,7 +10,8 @@ import numpy as np
 
 from enfilade.scene.mitsuba.shapes import has_lobe
 
-WRAPPERS = {"MaskBSDF", "BumpMap", "NormalMap"}  # their albedo is that of the BSDF nested in them
+MAPS = {"BumpMap", "NormalMap"}
+WRAPPERS = {"MaskBSDF", *MAPS}  # their albedo is that of the BSDF nested in them
 GLASS = {"spec_trans": 1.0, "metallic": 0.0, "clearcoat": 0.0}  # parameters of a `principled` interface
 # Largest roughness (alpha) of a lobe that shows images: it blurs them by 0.3 degrees.
 IMAGING_ALPHA = 0.0025
@@ -88,3 +89,11 @@ def is_diffuse_on(bsdf: Any, side: Any) -> bool:
     return any(
         has_lobe(part, "DiffuseReflection", "DiffuseTransmission") and part & int(side) for part in parts
     )
+
+
+def why_opaque(scene: Any) -> str:
+    """Reason why a cut-out would look opaque: Mitsuba's maps do not tell what passes it. Empty if none."""
+    for node in mi.traverse(scene).hierarchy:
+        if node.class_name() in MAPS and not {"MaskBSDF", "Null"}.isdisjoint(classes(node)):
+            return f"the {node.class_name()} {node.id()} contains a cut-out: let the cut-out contain the map"
+    return ""

@@ -10,6 +10,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from enfilade.arrays import lanes
 from enfilade.errors import SceneError
 from enfilade.resource_limits import is_out_of_memory
 from enfilade.scene.mitsuba.files import fingerprint, reason
@@ -26,7 +27,7 @@ def load_scene(file: Path) -> Any:
     ------
     SceneError
         The file is missing, malformed, or refused by Mitsuba; or a file that it names can't be read, or is an
-        image with values that are not finite.
+        image with values that are not finite; or a mesh has no triangles, or a shape no normals.
     MemoryError
     """
     gc.collect()
@@ -47,18 +48,58 @@ def load_scene(file: Path) -> Any:
         raise SceneError(f"{file} holds a {type(scene).__name__}, not a scene")
     if not scene.shapes():
         raise SceneError(f"{file} has no shapes: there is nothing to render")
-    if empty := [s.id() for s in scene.shapes() if isinstance(s, mi.Mesh) and not s.face_count()]:
-        raise SceneError(f"{file}: the mesh {empty[0]} has no triangles: leave it out")
+    _check_content(file, scene)
     if not scene.emitters():
         raise SceneError(
             f"{file} has no light, every frame would be black: add an <emitter>; or, in Blender, a lamp or a "
             "world with light, and import it again"
         )
+    return scene
+
+
+def _check_content(file: Path, scene: Any) -> None:
+    """Check the meshes and images of a scene."""
     parameters = mi.traverse(scene)
+    for node in parameters.hierarchy:
+        if isinstance(node, mi.Mesh):
+            _check_mesh(file, node)
     for name in parameters.keys():  # noqa: SIM118  (values are fetched one by one: some can't be)
         if name.endswith(".data"):  # of bitmaps, environment maps and grids
             _check_finite(file, name.removesuffix(".data"), np.asarray(parameters[name]))
-    return scene
+
+
+def _check_mesh(file: Path, mesh: Any) -> None:
+    """Refuse a mesh without triangles, and give vertices without a normal that of the triangles around them.
+
+    Mitsuba's normals are NaN there: the triangles around would have no light at all.
+    """
+    if not mesh.face_count():
+        raise SceneError(f"{file}: the mesh {mesh.id()} has no triangles: leave it out")
+    if not mesh.has_vertex_normals():
+        return
+    normals = np.array(mesh.vertex_normals_buffer()).reshape(-1, 3)
+    is_bad = ~(np.isfinite(normals).all(axis=1) & normals.any(axis=1))
+    if not is_bad.any():
+        return
+    parameters = mi.traverse(mesh)
+    if "vertex_normals" not in parameters:  # of a rectangle
+        raise SceneError(
+            f"{file}: the to_world of the shape {mesh.id()} leaves it no normals: does it scale by zero?"
+        )
+
+    # Add up the normals of the triangles, weighted by their area.
+    positions = np.array(mesh.vertex_positions_buffer()).reshape(-1, 3).astype(np.float64)
+    triangles = np.array(mesh.faces_buffer()).reshape(-1, 3)
+    first, second, third = positions[triangles].transpose(1, 0, 2)
+    around = np.zeros_like(positions)
+    for corner in triangles.T:
+        np.add.at(around, corner, np.cross(second - first, third - first))
+    length = np.linalg.norm(around, axis=1, keepdims=True)
+    around = np.where(length > 0.0, around / np.maximum(length, np.finfo(np.float64).tiny), (0.0, 0.0, 1.0))
+    parameters["vertex_normals"] = lanes(
+        np.where(is_bad[:, None], around, normals).astype(np.float32).ravel()
+    )
+    parameters.update()
 
 
 def _check_finite(file: Path, name: str, values: Any) -> None:

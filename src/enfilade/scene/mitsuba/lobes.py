@@ -333,6 +333,7 @@ def _number(bsdf: Any) -> Any:
 
 def _albedo_entry(number: Any, cosine: Any) -> Any:
     """Entries of the table of specular albedos; UInt."""
+    cosine = dr.select(dr.isfinite(cosine), cosine, 0.0)  # normals that cancel out have none
     return number * ALBEDO_BINS + UInt(dr.clip((0.5 + 0.5 * cosine) * ALBEDO_BINS, 0.0, ALBEDO_BINS - 1))
 
 

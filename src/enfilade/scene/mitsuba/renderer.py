@@ -36,6 +36,7 @@ from enfilade.renderer import (
     ShadingPoint,
     Surfaces,
 )
+from enfilade.scene.mitsuba.bsdfs import why_opaque
 from enfilade.scene.mitsuba.emitters import find_emitters, trace_photons
 from enfilade.scene.mitsuba.files import collected_warnings
 from enfilade.scene.mitsuba.integrators import (
@@ -142,7 +143,7 @@ class MitsubaRenderer:
 
     def why_inseparable(self) -> str:
         """See :meth:`enfilade.renderer.LobeRenderer.why_inseparable`."""
-        return why_inseparable(self._scene, self._integrator)
+        return why_inseparable(self._scene, self._integrator) or why_opaque(self._scene)
 
     def state(self) -> Any:
         """See :meth:`enfilade.renderer.LobeRenderer.state`."""
