@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import drjit as dr
 import mitsuba as mi
@@ -19,6 +19,7 @@ MAX_POINTS = 1 << 17  # on all emitters together
 POINTS = 64, 1024  # fewest and most on one
 SAMPLED = ("SRGBReflectanceSpectrum", "UniformSpectrum", "BitmapTexture")  # by Mitsuba, for rays of emitters
 PHOTONS = 1 << 14  # from all emitters together
+TEXTURE_SAMPLES, MIN_SAMPLED = 1 << 14, 0.95  # of a textured emitter, and the least part of its light
 
 
 def find_emitters(merged: MergedScene) -> Emitters:
@@ -50,6 +51,42 @@ def trace_photons(scene: Any) -> Photons:
     is_local = np.array(si.is_valid() & ~mi.has_flag(emitter.flags(), mi.EmitterFlags.Infinite))
     is_kept = is_local & np.isfinite(flux) & (flux > 0.0)
     return Photons(rows(Array3f(si.p))[is_kept], flux[is_kept])
+
+
+def half_sampled(merged: MergedScene) -> list[str]:
+    """Notes on textured emitters of which Mitsuba samples a part only.
+
+    Mitsuba chooses a point of the texture's unit square, and then a single point of the surface with these
+    texture coordinates.
+    """
+    notes = []
+    for source, shape in zip(merged.sources, merged.scene.shapes(), strict=True):
+        emitter = shape.emitter()
+        if emitter is None or not emitter.flags() & int(mi.EmitterFlags.SpatiallyVarying):
+            continue
+        if _has_pattern(emitter):  # Mitsuba can't sample it
+            continue
+
+        # Compare the light in front of the surface with what next-event estimation finds there.
+        sampler, wavelengths = one_sequence(TEXTURE_SAMPLES), cast(Any, [])
+        lit, point = (shape.sample_position(0.0, mi.Point2f(sampler.next_2d())) for _ in range(2))
+        here = dr.zeros(mi.SurfaceInteraction3f, TEXTURE_SAMPLES)
+        here.p = lit.p + lit.n * dr.norm(shape.bbox().extents())
+        toward = point.p - here.p
+        si = mi.SurfaceInteraction3f(point, wavelengths)
+        si.sh_frame = mi.Frame3f(point.n)
+        si.wi = si.to_local(-dr.normalize(toward))
+        cosine = dr.maximum(si.wi.z, 0.0)
+        light = shape.surface_area() * cosine * emitter.eval(si) / dr.squared_norm(toward)
+        _, found = emitter.sample_direction(here, mi.Point2f(sampler.next_2d()), True)
+        whole, sampled = (float(np.mean(rows(Array3f(of)) @ REC709_LUMINANCE)) for of in (light, found))
+        if sampled < MIN_SAMPLED * whole:
+            notes.append(
+                f"Mitsuba samples {sampled / whole:.0%} of the light of the emitter "
+                f"{merged.names[source[0] - 1]}, and what it lights is too dark: give it a UV map without "
+                "overlaps, in the unit square of its texture"
+            )
+    return notes
 
 
 def _has_pattern(emitter: Any) -> bool:
