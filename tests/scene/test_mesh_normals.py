@@ -7,22 +7,7 @@ import pytest
 from enfilade.device import active
 from enfilade.errors import SceneError
 from enfilade.scene.mitsuba.load import load_scene
-
-HEADER = """ply
-format ascii 1.0
-element vertex 4
-property float x
-property float y
-property float z
-property float nx
-property float ny
-property float nz
-element face 2
-property list uchar int vertex_indices
-end_header
-"""
-CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
-FACES = "3 0 1 2\n3 0 2 3\n"
+from support.mitsuba_scene import opened, write_square
 
 
 @pytest.fixture(autouse=True)
@@ -32,9 +17,7 @@ def variant():
 
 def normals_of(folder, third, flip):
     """Shading normals of a square, of which the third vertex has a given normal."""
-    normals = ["0 0 1", "0 0 1", third, "0 0 1"]
-    vertices = "".join(f"{x} {y} 0 {n}\n" for (x, y), n in zip(CORNERS, normals, strict=True))
-    (folder / "square.ply").write_text(HEADER + vertices + FACES)
+    write_square(folder / "square.ply", ("nx", "ny", "nz"), ["0 0 1", "0 0 1", third, "0 0 1"])
     flipped = f'<boolean name="flip_normals" value="{str(flip).lower()}"/>'
     square = f'<shape type="ply"><string name="filename" value="square.ply"/>{flipped}</shape>'
     file = folder / "scene.xml"
@@ -47,6 +30,7 @@ def normals_of(folder, third, flip):
 def test_vertices_without_a_normal_have_that_of_their_triangles(tmp_path, flip):
     whole = normals_of(tmp_path, "0 0 1", flip)
     np.testing.assert_allclose(normals_of(tmp_path, "0 0 0", flip), whole, atol=1e-6)
+    assert any("1 of 4 vertices" in note for note in opened(tmp_path / "scene.xml").describe().notes)
 
 
 def scaled_by_zero(folder, shape):

@@ -5,33 +5,17 @@ import numpy as np
 import pytest
 
 from enfilade.device import active
-from support.mitsuba_scene import opened
-
-HEADER = """ply
-format ascii 1.0
-element vertex 4
-property float x
-property float y
-property float z
-property float u
-property float v
-element face 2
-property list uchar int vertex_indices
-end_header
-"""
+from support.mitsuba_scene import opened, write_square
 
 
-def notes_of(folder, low, high, scale=1.0):
+def notes_of(folder, low, high):
     """Notes on a square that shines like a picture, with texture coordinates in a range."""
     mi.set_variant(active().variant)
-    corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
-    uv = ((low, low), (high, low), (high, high), (low, high))
-    vertices = "".join(f"{x} {y} 0 {u} {v}\n" for (x, y), (u, v) in zip(corners, uv, strict=True))
-    (folder / "square.ply").write_text(f"{HEADER}{vertices}3 0 1 2\n3 0 2 3\n")
+    uv = [f"{low} {low}", f"{high} {low}", f"{high} {high}", f"{low} {high}"]
+    write_square(folder / "square.ply", ("u", "v"), uv)
     picture = np.float32(np.random.default_rng(0).uniform(0.5, 1.0, (16, 16, 3)))
     mi.Bitmap(picture).write(str(folder / "picture.exr"))
-    transform = f'<transform name="to_uv"><scale value="{scale}"/></transform>'
-    radiance = f'<string name="filename" value="picture.exr"/><boolean name="raw" value="true"/>{transform}'
+    radiance = '<string name="filename" value="picture.exr"/><boolean name="raw" value="true"/>'
     light = f'<emitter type="area"><texture type="bitmap" name="radiance">{radiance}</texture></emitter>'
     shape = f'<shape type="ply" id="screen"><string name="filename" value="square.ply"/>{light}</shape>'
     (folder / "scene.xml").write_text(f'<scene version="3.0.0">{shape}</scene>')

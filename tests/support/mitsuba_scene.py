@@ -46,3 +46,14 @@ def opened(file, **settings):
 def write_holes(folder):
     """A texture whose left half is 1 and whose right half is 0."""
     write_exr(folder / "holes.exr", {"RGB": np.array([[[1.0] * 3, [0.0] * 3]], np.float32)}, is_portable=True)
+
+
+def write_square(file, names, values):
+    """A square of two triangles as PLY; its vertices have further properties, a text of values each."""
+    properties = "".join(f"property float {name}\n" for name in ("x", "y", "z", *names))
+    corners = ("-1 -1 0", "1 -1 0", "1 1 0", "-1 1 0")
+    vertices = "".join(f"{corner} {value}\n" for corner, value in zip(corners, values, strict=True))
+    faces = "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+    file.write_text(
+        f"ply\nformat ascii 1.0\nelement vertex 4\n{properties}{faces}{vertices}3 0 1 2\n3 0 2 3\n"
+    )

@@ -53,7 +53,7 @@ def trace_photons(scene: Any) -> Photons:
     return Photons(rows(Array3f(si.p))[is_kept], flux[is_kept])
 
 
-def half_sampled(merged: MergedScene) -> list[str]:
+def partly_sampled(merged: MergedScene) -> list[str]:
     """Notes on textured emitters of which Mitsuba samples a part only.
 
     Mitsuba chooses a point of the texture's unit square, and then a single point of the surface with these

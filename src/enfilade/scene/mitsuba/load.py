@@ -87,6 +87,13 @@ def _check_mesh(file: Path, mesh: Any) -> None:
             f"{file}: the to_world of the shape {mesh.id()} leaves it no normals: does it scale by zero?"
         )
 
+    untyped: Any = mi  # its stubs lack the logger
+    untyped.Log(
+        mi.LogLevel.Warn,
+        f"{is_bad.sum()} of {len(normals)} vertices of the mesh {mesh.id()} have no normal, and get that "
+        "of the triangles around them",
+    )
+
     # Add up the normals of the triangles, weighted by their area.
     positions = np.array(mesh.vertex_positions_buffer()).reshape(-1, 3).astype(np.float64)
     triangles = np.array(mesh.faces_buffer()).reshape(-1, 3)

@@ -37,7 +37,7 @@ from enfilade.renderer import (
     Surfaces,
 )
 from enfilade.scene.mitsuba.bsdfs import why_opaque
-from enfilade.scene.mitsuba.emitters import find_emitters, half_sampled, trace_photons
+from enfilade.scene.mitsuba.emitters import find_emitters, partly_sampled, trace_photons
 from enfilade.scene.mitsuba.files import collected_warnings
 from enfilade.scene.mitsuba.integrators import (
     has_depth_limit,
@@ -99,7 +99,7 @@ class MitsubaRenderer:
             renderer=f"Mitsuba {mi.__version__}",
             shapes=self._shapes.names,
             has_background=scene.environment() is not None,
-            notes=(*ignored(scene, self._integrator), *half_sampled(self._merged), *warnings),
+            notes=(*ignored(scene, self._integrator), *partly_sampled(self._merged), *warnings),
         )
         self._surfaces = recorded(
             lambda rays: self._intersect(rays)[0], lambda: (scene, self._shapes.state, self._lobes.state)
