@@ -16,6 +16,9 @@ from scene_views import View, folder_bytes, read_path
 
 from enfilade.camera import load_path
 from enfilade.errors import InputError, SettingsError
+from enfilade.scene.mitsuba.emitters import partly_sampled
+from enfilade.scene.mitsuba.load import load_scene
+from enfilade.scene.mitsuba.merge import merge_meshes
 from studies.scenes import PRESETS, SCENES, SceneFiles, write_scene
 from studies.scenes import courtyard_plan as courtyard
 from studies.scenes import gallery_plan as gallery
@@ -67,6 +70,14 @@ def test_references_resolve_within_the_folder(name: str, small: dict[str, SceneF
     assert {e.get("id") for e in root.iter("ref")} <= set(names)
     if name == "room":
         assert {e.get("type") for e in root.iter("bsdf")} == {"twosided", "diffuse"}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_emitters_are_sampled_whole(
+    name: str, small: dict[str, SceneFiles], loaded: Callable[[str], Any]
+) -> None:
+    loaded(name)  # chooses the variant
+    assert partly_sampled(merge_meshes(load_scene(small[name].scene))) == []
 
 
 @pytest.mark.parametrize("name", SCENES)
