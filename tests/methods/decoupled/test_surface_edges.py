@@ -1,6 +1,7 @@
 """Edges between surfaces, and thin surfaces, against loops and on shapes whose edges are known."""
 
 import numpy as np
+import pytest
 
 from enfilade.gbuffer import find_geometry
 from enfilade.methods.decoupled import surface_edges as kernel
@@ -63,18 +64,35 @@ def test_a_post_narrower_than_three_pixels_is_thin(tmp_path):
     assert shares[1] < 0.1
 
 
-def test_bars_are_narrow_and_squares_are_not():
-    surface = np.zeros((50, 60), int)
-    surface[5:25, 5:25] = 1  # a square
-    surface[5:45, 32:38] = 2  # a bar of six pixels
-    surface[5:45, 45:53] = 3  # a bar of eight pixels
+def edges_of(surface):
+    """Pixels with one of their four neighbours on another surface."""
     is_edge = np.zeros(surface.shape, bool)
     for axis in (0, 1):
         step = np.diff(surface, axis=axis) != 0
         is_edge |= np.pad(step, [(1, 0), (0, 0)][:: 1 - 2 * axis])
         is_edge |= np.pad(step, [(0, 1), (0, 0)][:: 1 - 2 * axis])
-    found = kernel.narrow_surfaces(is_edge, surface > 0)
+    return is_edge
+
+
+def test_bars_are_narrow_and_squares_are_not():
+    surface = np.zeros((50, 60), int)
+    surface[5:25, 5:25] = 1  # a square
+    surface[5:45, 32:38] = 2  # a bar of six pixels
+    surface[5:45, 45:53] = 3  # a bar of eight pixels
+    found = kernel.narrow_surfaces(edges_of(surface), surface > 0)
     assert found[surface == 2].all()
     assert not found[surface == 1].any()
     assert not found[surface == 3].any()
     assert not found[surface == 0].any()
+
+
+@pytest.mark.parametrize("width", [1, 2, 3, 6])
+@pytest.mark.parametrize("slope", [0.0, 0.3, 1.0])
+def test_bars_before_a_wide_wall_are_narrow(width, slope):
+    row, column = np.indices((60, 80))
+    offset = np.floor(column - slope * row) - 20
+    is_bar = (offset >= 0) & (offset < width)
+    found = kernel.narrow_surfaces(edges_of(is_bar.astype(int)), np.ones_like(is_bar))
+    inside = (slice(8, 52), slice(8, 72))
+    assert found[inside][is_bar[inside]].all()
+    assert not found[inside][~is_bar[inside]].any()

@@ -89,12 +89,12 @@ def test_lookup_matches_loops(wall, shape_index):
     assert 0.2 < np.mean([w > 0 for _, w in wanted]) < 0.8
 
 
-def test_pixels_are_weighted_by_the_cosine_of_the_normals(wall):
+def test_pixels_are_weighted_by_the_fourth_power_of_the_cosine_of_the_normals(wall):
     points = np.random.default_rng(3).uniform((-0.8, -0.8, 0.0), (0.8, 0.8, 0.0), (50, 3))
     turned = np.zeros((HEIGHT, WIDTH, 3), np.float32)
     turned[..., 0], turned[..., 2] = np.sin(1.1), np.cos(1.1)
     plain, got = found(wall, points, 1), found(wall, points, 1, normals=turned)
-    np.testing.assert_allclose(np.array(got.weight), np.cos(1.1) * np.array(plain.weight), atol=3e-3)
+    np.testing.assert_allclose(np.array(got.weight), np.cos(1.1) ** 4 * np.array(plain.weight), atol=1e-3)
     other_way = found(wall, points, 1, normals=turned * np.float32([1, 1, -1]))
     assert not np.array(other_way.weight).any()
 
@@ -205,5 +205,5 @@ def test_normals_that_differ_by_more_than_the_least_cosine_do_not_count(wall):
         np.array(found(wall, points, [1] * 4, normals=normals, min_cosine=least).weight)
         for least in (0.7, 0.9)
     )
-    assert (loose > 0.5).all()
-    assert (strict > 0.5).tolist() == [False, False, True, True]
+    np.testing.assert_allclose(loose, [0.8**4, 0.8**4, 1.0, 1.0], atol=0.01)
+    np.testing.assert_allclose(strict, [0.0, 0.0, 1.0, 1.0], atol=0.01)

@@ -27,7 +27,7 @@ from enfilade.settings import DecoupledSettings, ViewingSettings
 EDGE_SPP = 16  # rays of a pixel at an edge; their number doubles while its value is uncertain
 DISPLAYED_DEVIATION = 0.0033  # times the square root of the quality: above it a displayed value is uncertain
 SPECULAR_DEVIATION = 2.0  # times that: specular rays, which cost more than camera rays
-SPECULAR_CONTRAST = 2.0 / 3.0  # times that: specular AOVs are refined where half their contrast exceeds it
+SPECULAR_CONTRAST = 1.0 / 3.0  # times that: specular AOVs are refined where half their contrast exceeds it
 
 
 @dataclass(frozen=True)

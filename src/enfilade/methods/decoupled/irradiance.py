@@ -11,15 +11,19 @@ from enfilade.methods.decoupled.light_camera import irradiance_camera
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.decoupled.sample_counts import irradiance_spp
 from enfilade.methods.decoupled.shot import ShotContext, either_side
+from enfilade.methods.decoupled.surface_edges import narrow_surfaces, surface_edges
 from enfilade.methods.decoupled.surface_image import UploadedImage
 from enfilade.records import Mask
 from enfilade.renderer import Purpose
 
+NARROW_PATHS = 4  # times the paths of a pixel, on narrow surfaces: a denoiser leaves their noise
 MIN_DISOCCLUSION = 5e-3  # of a frame's pixels: fewer have no image, and are estimated in each frame
 
 
 def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage, RayCount]:
     """Gather the irradiance of some pixels of an irradiance image, at their centres.
+
+    Narrow surfaces, such as bevels, have more paths.
 
     Parameters
     ----------
@@ -40,7 +44,10 @@ def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage
         lambda rays, sampler: shot.integrator.final_gather(cache, shot.spawn(frame, rays, sampler)),
         walk.random(frame, Purpose.IRRADIANCE),
     )
-    estimate.add(irradiance_spp(shot.settings, len(shot.keyframes)))
+    spp = irradiance_spp(shot.settings, len(shot.keyframes))
+    is_edge, _ = surface_edges(shot.images.irradiance_geometry(frame))
+    estimate.add(spp)
+    estimate.add((NARROW_PATHS - 1) * spp, narrow_surfaces(is_edge, where)[where])
     direct, indirect = (shading.to_image(where) for shading in estimate.shadings)
     return IrradianceImage(direct, indirect, where).with_noise(NOISE_SHARE), estimate.count
 

@@ -100,7 +100,7 @@ def shade_specular(
     del traced
 
     # Choose the edges: those in mirrors and panes, surfaces that centres miss, and those between surfaces
-    # where the AOVs differ visibly. Aliasing is more visible than noise: its tolerance is a third of that of
+    # where the AOVs differ visibly. Aliasing is more visible than noise: its tolerance is a sixth of that of
     # noise.
     has_visible_contrast = AdaptiveSampling.of(
         shot.walk, times=SPECULAR_CONTRAST, beneath=beneath

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import drjit as dr
+import numpy as np
 
 from enfilade.arrays import Array3f, Bool, Float, Int, UInt, image, lanes, opaque, pixel_grid
 from enfilade.kernels.rays import points_at
-from enfilade.methods.decoupled.edges import dilated
+from enfilade.methods.decoupled.edges import beside, dilated
 from enfilade.methods.decoupled.surface_image import PLANE_TOLERANCE
 from enfilade.records import Geometry, Mask
 
@@ -72,7 +73,8 @@ def surface_edges(geometry: Geometry) -> tuple[Mask, Mask]:
 def narrow_surfaces(is_edge: Mask, where: Mask) -> Mask:
     """Pixels of surfaces, or of parts of them, that are narrower than six to seven pixels.
 
-    A denoiser has few pixels there from which it could tell light from noise.
+    A denoiser has few pixels there from which it could tell light from noise. Single pixels, such as the
+    corners of wide surfaces, do not count.
 
     Parameters
     ----------
@@ -86,5 +88,10 @@ def narrow_surfaces(is_edge: Mask, where: Mask) -> Mask:
     (H, W) bool
     """
     near = dilated(is_edge, MARGIN)
-    wide = dilated(where & ~near, MARGIN + 2)
-    return where & near & ~wide
+    wide = where & ~near
+    for _ in range(2 * (MARGIN + 1)):  # as far as the corner of a wide surface
+        # Of pixels that are no edges, the four neighbours show the same surface.
+        padded = np.pad(wide & ~is_edge, 1)
+        wide |= padded[:-2, 1:-1] | padded[2:, 1:-1] | padded[1:-1, :-2] | padded[1:-1, 2:]
+    narrow = where & near & ~wide
+    return narrow & beside(narrow)

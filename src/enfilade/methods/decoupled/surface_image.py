@@ -159,8 +159,8 @@ def lookup(
 
     Of the four pixels around a point's projection those are valid that show the same shape within
     :data:`PLANE_TOLERANCE` of the point's tangent plane, which excludes occluders and surfaces that meet at
-    an edge. Pixels are weighted bilinearly and by the cosine between the normals. Images of the back of the
-    surface are not used.
+    an edge. Pixels are weighted bilinearly and by the fourth power of the cosine between the normals, so that
+    a bevel has its own light where a pixel shows it. Images of the back of the surface are not used.
 
     Parameters
     ----------
@@ -216,7 +216,7 @@ def lookup(
         if image.normals is not None:
             other = _unpacked(dr.gather(UInt, image.normals, tap.lane, is_inside))
             cosine = dr.dot(normal, other) * scale
-            of_tap *= dr.select(cosine > min_cosine, cosine, 0.0)
+            of_tap *= dr.select(cosine > min_cosine, dr.square(dr.square(cosine)), 0.0)
         for layer, (value, variance) in enumerate(zip(image.values, image.variances, strict=True)):
             totals[layer] += of_tap * Array3f(dr.gather(type(value), value, tap.lane, is_same))
             variances[layer] += of_tap * dr.gather(Float, variance, tap.lane, is_same)

@@ -1,0 +1,44 @@
+"""Numbers of paths of irradiance images."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from enfilade.camera.path import CameraPath
+from enfilade.camera.pinhole import Camera, look_at
+from enfilade.methods.decoupled import Decoupled, irradiance
+from enfilade.methods.decoupled.light_camera import irradiance_camera
+from enfilade.methods.decoupled.surface_edges import narrow_surfaces, surface_edges
+from support.in_memory import run_passes, walk_of
+from support.mitsuba_scene import DIFFUSE, opened, placed, write
+
+SIZE = 64, 48
+PATH = CameraPath((Camera(look_at((0.3, 0.3, 4), (0, 0, 0)), 40, *SIZE),), (1,), 24.0)
+
+pytestmark = pytest.mark.slow
+
+
+def test_narrow_surfaces_have_more_paths(tmp_path, monkeypatch):
+    slats = [placed("cube", f"slat{i}", (0.5 * i - 0.8, 0.3, 0.3), DIFFUSE, 0.04) for i in range(4)]
+    wall = placed("rectangle", "wall", (0, 0, -1), DIFFUSE, 4)
+    renderer = opened(write(tmp_path, *slats, wall))
+    walk = walk_of(PATH, renderer, decoupled={"denoiser": "none", "irradiance_spp": 8})
+
+    def run():
+        results = run_passes(Decoupled(), walk)
+        return results.record("irradiance", 0), results.metadata("irradiance", 0)["rays"]["irradiance"]
+
+    found, rays = run()
+    monkeypatch.setattr(irradiance, "NARROW_PATHS", 1)
+    plain, plain_rays = run()
+
+    # Narrow surfaces have four times as many paths, which have less noise; all others stay as they are.
+    camera = irradiance_camera(PATH.cameras[0])
+    geometry = walk_of(replace(PATH, cameras=(camera,)), renderer).view(0).geometry
+    narrow = narrow_surfaces(surface_edges(geometry)[0], geometry.has_diffuse)
+    assert 20 < narrow.sum() < 500
+    assert rays - plain_rays == 3 * 8 * narrow.sum()
+    np.testing.assert_array_equal(found.indirect.color[~narrow], plain.indirect.color[~narrow])
+    noise, plain_noise = (image.indirect.variance[narrow].mean() for image in (found, plain))
+    assert noise < 0.35 * plain_noise
