@@ -140,9 +140,9 @@ def add_roof(writer: SceneWriter, preset: Preset) -> None:
         )
     )
     writer.mesh("entablature", join(beams), "stone-trim")
-    tile = EAST_EDGE, NORTH_EDGE - SOUTH_EDGE
-    sky = _sheet(0, SOUTH_EDGE, EAST_EDGE, NORTH_EDGE, tile).tiled(1.0, 1.0, (0.0, -SOUTH_EDGE / tile[1]))
-    writer.mesh("roof-sky", sky.flipped().at(0, 0, HEIGHT + 0.26), "glow")
+    size = EAST_EDGE, NORTH_EDGE - SOUTH_EDGE
+    sky = _sheet(0, 0, *size, size).flipped()
+    writer.mesh("roof-sky", sky.at(0, SOUTH_EDGE, HEIGHT + 0.26), "glow")
     writer.light(writer.radiance("clouds", pictures.overcast(preset.texture // 4, 3.6)), weight=4.0)
     north = _sheet(0, 0, LENGTH, 3.4, (LENGTH, 3.4)).turned(90, "x")
     east = _sheet(0, 0, 9.0, 3.6, (9.0, 3.6)).turned(90, "x").turned(EAST)
