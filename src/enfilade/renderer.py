@@ -339,6 +339,10 @@ class LobeRenderer(Renderer, Protocol):
         """Whether any emitter casts sharp shadows: a point, spot or directional one, small lamp, or sun."""
         ...
 
+    def has_specular_texture(self) -> bool:
+        """Whether textures colour any specular lobe: :meth:`specular_tint`."""
+        ...
+
     def intersect(
         self,
         rays: Rays,
@@ -427,6 +431,14 @@ class LobeRenderer(Renderer, Protocol):
         """Emission of the next surface, or of the environment, that smooth coats reflect; Array3f.
 
         It has no noise. It is 0 where :attr:`ShadingPoint.is_coated` is false.
+        """
+        ...
+
+    def specular_tint(self, point: ShadingPoint) -> Any:
+        """Reflectance of specular lobes that textures colour, in the direction of a mirror; Array3f.
+
+        It has no noise, and is above 0. Light divided by it varies less over a surface than light does. It is
+        1 where no texture colours the lobes, and where they are delta lobes.
         """
         ...
 

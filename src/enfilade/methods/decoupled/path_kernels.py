@@ -77,6 +77,8 @@ class PathKernels:
         Light on visible surfaces, and where it comes from.
     see
         Camera rays, and the irradiance in their view.
+    see_tint
+        Camera rays, and the reflectance of specular lobes that textures colour.
     see_aovs
         Camera rays, and filtered specular AOVs.
     extend
@@ -97,6 +99,7 @@ class PathKernels:
         self._renderer, state = renderer, renderer.state
         self.probe = recorded(lambda guide, path: trace_probes(renderer, guide, path), state)
         self.see = recorded(self._see, state)
+        self.see_tint = recorded(self._see_tint, state)
         self.see_aovs = recorded(self._see_aovs, state)
         self.query_further = recorded(query_further, lambda: None)
         self.extend = recorded(self._extend, state)
@@ -109,6 +112,11 @@ class PathKernels:
         """Camera rays: intersect, and query the cache."""
         emitted, vertex = self._intersect(cache, path)
         return replace(vertex, radiance=emitted + vertex.radiance)
+
+    def _see_tint(self, path: Path) -> Any:
+        """Camera rays: intersect, and evaluate the tint of specular lobes; Array3f."""
+        point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
+        return Array3f(self._renderer.specular_tint(point))
 
     def _see_aovs(self, aovs: UploadedImage, unit: Any, path: Path) -> tuple[Any, ...]:
         """Camera rays: intersect, and look up the AOVs; whether they miss a surface with specular lobes."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from enfilade.scene.mitsuba.shapes import has_lobe
 
+COLORS = {"base_color", "specular_reflectance"}  # parameters that colour specular lobes
 MAPS = {"BumpMap", "NormalMap"}
 WRAPPERS = {"MaskBSDF", *MAPS}  # their albedo is that of the BSDF nested in them
 GLASS = {"spec_trans": 1.0, "metallic": 0.0, "clearcoat": 0.0}  # parameters of a `principled` interface
@@ -59,6 +60,17 @@ def is_narrow(bsdf: Any) -> bool:
         all(constant(bsdf, name) <= IMAGING_ALPHA for name in names)
         for names in (("alpha",), ("alpha_u", "alpha_v"))
     )
+
+
+def is_tinted(bsdf: Any) -> bool:
+    """Whether a texture colours the specular lobes of a BSDF or of one nested in it."""
+    if bsdf.class_name() == "Principled" and constant(bsdf, "metallic") == 0.0:
+        return False
+    own = any(
+        name in COLORS and rest and rest != "value"
+        for name, _, rest in (key.partition(".") for key, _ in mi.traverse(bsdf))
+    )
+    return own or any(map(is_tinted, nested(bsdf)))
 
 
 def mixes_delta_lobes(bsdf: Any) -> bool:

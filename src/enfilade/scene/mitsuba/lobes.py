@@ -21,7 +21,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from enfilade.arrays import Bool, Float, UInt, lanes
+from enfilade.arrays import Array3f, Bool, Float, UInt, lanes
 from enfilade.kernels.random import one_sequence
 from enfilade.renderer import Branch
 from enfilade.scene.mitsuba.bsdfs import (
@@ -29,6 +29,7 @@ from enfilade.scene.mitsuba.bsdfs import (
     classes,
     is_diffuse_on,
     is_narrow,
+    is_tinted,
     is_turned,
     mixes_delta_lobes,
     rough_ior,
@@ -42,6 +43,7 @@ LAMBERTIAN = {"MaskBSDF", "TwoSidedBRDF", "SmoothDiffuse"}  # of these alone: La
 
 COATED = {"SmoothPlastic", "TwoSidedBRDF"}  # of these alone: a smooth coat over a Lambertian lobe
 CLEAR = {"SmoothDielectric", "ThinDielectric"}
+MIN_TINT = 0.01  # below it a texture is taken to be as dark
 ALMOST_ONE = 1.0 - 2.0**-24
 
 ALBEDO_BINS = 16  # of a BSDF's specular albedo, by the cosine of the viewer's direction, -1..1
@@ -82,6 +84,8 @@ class Lobes:
         self._rough_ior = bsdf_table(scene, rough_ior, Float)
         self._narrow = bsdf_table(scene, is_narrow)
         self._coated = bsdf_table(scene, lambda bsdf: classes(bsdf) <= COATED)
+        self._tinted = bsdf_table(scene, is_tinted)
+        self.has_tinted = bool(dr.any(self._tinted))
         self.has_coats = bool(dr.any(self._coated))
         self._has_whole = bool(dr.any(self._whole))
         self._mixed = bsdf_table(scene, mixes_delta_lobes)
@@ -92,7 +96,7 @@ class Lobes:
     def state(self) -> Any:
         """Arrays that the methods read, but for that of `specular_albedo`."""
         albedos = self._bases, self._turned, self._masked
-        interfaces = self._clear, self._rough_ior, self._narrow, self._coated
+        interfaces = self._clear, self._rough_ior, self._narrow, self._coated, self._tinted
         return self._whole, self._lambertian, self._sides, self._mixed, interfaces, albedos
 
     def has_specular(self, si: Any, bsdf: Any) -> Any:
@@ -173,6 +177,16 @@ class Lobes:
         albedo = self.albedo(si, bsdf, active & is_whole)
         difference, mixture_pdf = self._difference(si, bsdf, wo, albedo, active & is_whole)
         return dr.select(is_whole, difference, value), dr.select(is_whole, mixture_pdf, pdf)
+
+    def specular_tint(self, si: Any, bsdf: Any, active: Any) -> Any:
+        """Reflectance of specular lobes that textures colour, in the direction of a mirror; Array3f.
+
+        It is 1 elsewhere, and for delta lobes.
+        """
+        is_tinted = active & _of(self._tinted, si, bsdf)
+        value, pdf = self.eval_specular(si, bsdf, mi.reflect(si.wi), is_tinted)
+        tint = dr.maximum(Array3f(value) / pdf, MIN_TINT)
+        return dr.select(is_tinted & (pdf > 0.0), tint, 1.0)
 
     def is_clear(self, si: Any, bsdf: Any) -> Any:
         """Whether a BSDF is a clear interface: it reflects or transmits, in one direction each."""

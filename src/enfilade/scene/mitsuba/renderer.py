@@ -181,6 +181,10 @@ class MitsubaRenderer:
         """See :meth:`enfilade.renderer.LobeRenderer.has_sharp_light`."""
         return not self._transport.sharp_emitters.is_empty
 
+    def has_specular_texture(self) -> bool:
+        """See :meth:`enfilade.renderer.LobeRenderer.has_specular_texture`."""
+        return self._lobes.has_tinted
+
     def intersect(
         self,
         rays: Rays,
@@ -234,6 +238,10 @@ class MitsubaRenderer:
     def coat_emission(self, point: ShadingPoint) -> Any:
         """See :meth:`enfilade.renderer.LobeRenderer.coat_emission`."""
         return self._transport.coat_emission(point)
+
+    def specular_tint(self, point: ShadingPoint) -> Any:
+        """See :meth:`enfilade.renderer.LobeRenderer.specular_tint`."""
+        return self._lobes.specular_tint(point.native, point.native.bsdf(), point.has_specular)
 
     def sample_diffuse(
         self, point: ShadingPoint, sampler: Any, *, soft_only: bool = False, guide: PathGuide | None = None
