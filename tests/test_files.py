@@ -157,6 +157,17 @@ def test_a_folder_appears_whole_or_not_at_all(tmp_path):
     assert [entry.name for entry in out.parent.iterdir()] == ["scene"]
 
 
+def test_a_link_to_a_folder_stays(tmp_path):
+    (tmp_path / "disk").mkdir()
+    link = tmp_path / "scene"
+    link.symlink_to(tmp_path / "disk")
+    with whole_folder(link) as beside:
+        (beside / "a.ply").touch()
+    assert link.is_symlink()
+    assert [entry.name for entry in (tmp_path / "disk").iterdir()] == ["a.ply"]
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["disk", "scene"]
+
+
 def test_an_interrupted_replacement_leaves_the_older_folder(tmp_path, monkeypatch):
     out, rename = tmp_path / "scene", Path.rename
     with whole_folder(out) as beside:

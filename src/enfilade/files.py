@@ -1,7 +1,8 @@
 """Atomic file writes: files are written under a temporary name, flushed to the disk and renamed.
 
 A killed process leaves the older file or none under the final name, and possibly a temporary file
-``.NAME.writing-HOST-PID-RANDOM.SUFFIX``, which :func:`sweep` and :func:`sweep_beside` remove.
+``.NAME.writing-HOST-PID-RANDOM.SUFFIX``. :func:`sweep` removes those in a folder, :func:`sweep_beside` the
+folders beside a final name.
 """
 
 from __future__ import annotations
@@ -89,6 +90,7 @@ def whole_folder(folder: Path) -> Iterator[Path]:
     RunFolderError, NoSpaceError
         A folder or a file can't be written, or the disk is full. No temporary folder is left.
     """
+    folder = folder.resolve()  # a link stays
     temporary, old = _beside(folder), _beside(folder)
     try:
         temporary.mkdir(parents=True)

@@ -17,7 +17,7 @@ from enfilade_blender.materials.graph import Graph
 from enfilade_blender.materials.image_pixels import fault, linear_pixels
 from enfilade_blender.materials.stand_ins import IMAGES, put_stand_ins
 from enfilade_blender.materials.table import VIEW_SOCKETS
-from enfilade_blender.materials.textures import ENVIRONMENT, RENDERED
+from enfilade_blender.materials.textures import ENVIRONMENT
 from enfilade_blender.materials.values import Constant, Emission, Nothing
 from enfilade_blender.motion import trees
 from enfilade_blender.notes import Notes
@@ -44,7 +44,7 @@ def environment(selection: Selection, sun: Sun | None, folder: Path, notes: Note
     if plain is not None:
         image = np.broadcast_to(np.array(plain, np.float32), (WIDTH_SUN // 2, WIDTH_SUN, 3)).copy()
     else:
-        image = _rendered(world, WIDTH_SUN if sun else WIDTH, folder, selection.frames[0], notes)
+        image = _rendered(world, WIDTH_SUN if sun else WIDTH, selection.frames[0], notes)
         image = _positive(image, world, notes)
         what = f"an environment map of {image.shape[1]}x{image.shape[0]}"
         notes.add("baked", world.name, "World", what, "detail is limited to its pixels")
@@ -123,7 +123,7 @@ def _positive(radiance: np.ndarray, world: Any, notes: Notes) -> np.ndarray:
     return np.maximum(radiance, 0.0)
 
 
-def _rendered(world: Any, width: int, folder: Path, frame: int, notes: Notes) -> F32:
+def _rendered(world: Any, width: int, frame: int, notes: Notes) -> F32:
     """Radiance of a world at a frame, from north at the left edge over east, zenith on top."""
     nodes = [node for tree in trees(world.node_tree) for node in tree.nodes]
     images = [node.image for node in nodes if node.type in IMAGES and node.image]
@@ -145,7 +145,7 @@ def _rendered(world: Any, width: int, folder: Path, frame: int, notes: Notes) ->
     render.resolution_x, render.resolution_y, render.resolution_percentage = width, width // 2, 100
     settings = render.image_settings
     settings.file_format, settings.color_depth, settings.color_mode = "OPEN_EXR", "32", "RGB"
-    file = folder / "textures" / f"{RENDERED}.exr"
+    file = Path(bpy.app.tempdir, "world.exr")  # Blender takes braces in a path for a template
     render.filepath = str(file)
     cycles = scene.cycles
     cycles.samples = SAMPLES_SKY if has_sky else SAMPLES

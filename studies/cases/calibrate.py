@@ -11,7 +11,7 @@ import click
 from enfilade.cli.group import debug_option, mark_resumable
 from enfilade.cli.jobs import job_of
 from enfilade.cli.options import (
-    check_png,
+    check_suffix,
     choose_device,
     output_options,
     path_options,
@@ -79,7 +79,7 @@ def threshold(
     A few frames are rendered twice: with every pixel traced, and composited from keyframes. The metric gives
     the velocity up to which pixels must be traced. The result is a value for --set masks.slow_deg_s.
     """
-    check_png("--plot", plot)
+    check_suffix("--plot", plot, ".png")
     if folder is not None:
         mark_resumable(ctx)
     choose_device(inputs.pop("device"))

@@ -23,6 +23,8 @@ def test_render_continue_and_report(run, line, tmp_path):
     assert again["frames"] == 3
     assert again["plots"]
     assert RunFolder.read(folder).digest() == digest
+    assert "ends in .html" in run("report", folder, "--out", folder / "job.json").stderr
+    assert "ends in .json" in run("farm", folder, "--out", folder / "frames.exr").stderr
     assert run("report", folder, "--quiet").stdout == f"report  {folder}/report.html\n"
     encoded = run("encode", folder, "--codec", "ffv1", "--exposure-ev", "1", "--quiet")
     assert encoded.stdout == f"video   {folder}/encoded.mkv\n"

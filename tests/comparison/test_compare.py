@@ -101,6 +101,8 @@ def test_exposure_is_for_scene_linear_frames_alone(sequence, tmp_path):
     found = compared(tmp_path / "shown.png", dark, exposure_ev=1.0)
     assert found.frames[0].percent_visible == 0.0
     assert found.psnr_db > 45.0
+    with pytest.raises(ImageError, match="leave out --exposure-ev"):
+        compared(tmp_path / "shown.png", tmp_path / "shown.png", exposure_ev=1.0)
 
 
 def run_of(folder, exposure_ev):

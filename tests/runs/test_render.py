@@ -168,6 +168,13 @@ def test_damaged_lines_of_the_ledger_cost_their_task_and_no_more(job, run, tmp_p
     assert sum(attempts(tmp_path).values()) <= len(attempts(tmp_path)) + 1
 
 
+def test_a_prepared_run_says_what_is_to_be_known(job, run, monkeypatch):
+    monkeypatch.setattr(Scene, "preflight", lambda *_: Preflight("", ["the sky is left out"]))
+    monitor = Recorder()
+    prepare(job, run, monitor, has_preflight=True)
+    assert monitor.said == ["the sky is left out"]
+
+
 def test_a_damaged_job_is_written_again(job, run, whole):
     prepare(job, run)
     (run / "job.json").write_text("{")

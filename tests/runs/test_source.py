@@ -107,6 +107,17 @@ def test_wrong_files_leave_no_folder(tables, tmp_path):
     assert not (tmp_path / "run").exists()
 
 
+def test_the_scene_of_a_lost_file_is_rendered_as_the_message_says(shot, tables, tmp_path):
+    run, source = tmp_path / "my run", shot()
+    imported(source, run, tables)
+    source.unlink()
+    with pytest.raises(SceneError, match=r"`enfilade render '.*/my run/scene' --out '.*/my run'` continues"):
+        imported(source, run, tables)
+    (run / "ledger.jsonl").touch()
+    with pytest.raises(SceneError, match=r"`enfilade work '.*/my run'` continues"):
+        imported(source, run, tables)
+
+
 def test_a_failed_import_does_not_spoil_the_folder(shot, tables, tmp_path):
     run = tmp_path / "run"
     with pytest.raises(SceneError):

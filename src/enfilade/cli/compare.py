@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from enfilade.cli.group import debug_option
+from enfilade.cli.group import debug_option, ending_on_sigterm
 from enfilade.cli.options import (
     check_effect,
-    check_png,
+    check_suffix,
     given_in,
     json_option,
     quiet_option,
@@ -132,7 +132,7 @@ def command(
     small or brief difference has a lower score than its own JND; where it is visible, the largest value is
     printed, too. Noise of the reference counts as a difference, and is mentioned where it is a notable part.
     """
-    check_png("--graph", graph)
+    check_suffix("--graph", graph, ".png")
     show = None if heatmap is None else _painted(heatmap)
     sources = [source for source in (test, reference, second_reference) if source is not None]
     _check_apart(sources, heatmap, graph)
@@ -140,7 +140,7 @@ def command(
     from enfilade.cli.progress import watch
     from enfilade.comparison import compare
 
-    with watch(quiet=quiet) as monitor:
+    with ending_on_sigterm(), watch(quiet=quiet) as monitor:
         difference = compare(test, reference, options, monitor, second_reference=second_reference, show=show)
     found = difference.to_dict()
     if as_json:

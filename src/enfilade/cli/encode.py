@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from enfilade.cli.group import debug_option
+from enfilade.cli.group import debug_option, ending_on_sigterm
 from enfilade.cli.options import (
     VIDEO_FLAGS,
     check_effect,
@@ -47,7 +47,7 @@ def command(
     from enfilade.cli.progress import watch
     from enfilade.runs.encode import encode
 
-    with watch(quiet=quiet) as monitor:
+    with ending_on_sigterm(), watch(quiet=quiet) as monitor:
         changes = {name: tables.get(name, {}) for name in ("video", "viewing")}
         made = encode(run, changes, monitor, file=file, is_partial=is_partial, is_replaced=is_replaced)
     click.echo(f"video   {made}")

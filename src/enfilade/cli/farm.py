@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from enfilade.cli.group import debug_option
-from enfilade.cli.options import value_of
+from enfilade.cli.options import check_suffix, value_of
 from enfilade.errors import SettingsError
 
 
@@ -47,6 +47,7 @@ def command(
         raise SettingsError("--slurm needs --submit slurm")
     if file is not None and cluster is not None:
         raise SettingsError("--out has no effect with --submit, which writes no template")
+    check_suffix("--out", file, ".json")
     from enfilade.files import write_json
     from enfilade.runs.farm import TEMPLATE, submit, template
 

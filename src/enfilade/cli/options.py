@@ -336,12 +336,12 @@ def check_effect(ctx: click.Context, what: str, read: Mapping[type[Section], Col
             raise SettingsError(f"{flag} has no effect on {what}, which does not read {name}")
 
 
-def check_png(flag: str, file: Path | None) -> None:
-    """Refuse a picture whose name is that of another format.
+def check_suffix(flag: str, file: Path | None, suffix: str) -> None:
+    """Refuse a file whose name is that of another format: it may be one that is to stay.
 
     Raises
     ------
     SettingsError
     """
-    if file is not None and file.suffix.lower() != ".png":
-        raise SettingsError(f"{flag} {file}: give a file name that ends in .png")
+    if file is not None and file.suffix.lower() != suffix:
+        raise SettingsError(f"{flag} {file}: give a file name that ends in {suffix}")

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from enfilade.cli.group import debug_option
+from enfilade.cli.group import debug_option, ending_on_sigterm
 from enfilade.cli.jobs import job_of
 from enfilade.cli.options import (
     FLAGS,
-    check_png,
+    check_suffix,
     choose_device,
     job_options,
     output_options,
@@ -48,14 +48,14 @@ def command(
 
     A .blend, glTF, USD, FBX or OBJ file is imported by Blender for this; `enfilade import` keeps the scene.
     """
-    check_png("--plot", plot)
+    check_suffix("--plot", plot, ".png")
     choose_device(inputs.pop("device"))
     from enfilade.cli.progress import watch
     from enfilade.runs.plan import plan
 
     with scratch_folder("enfilade-plan") as run:
         job = job_of(ctx, run=run, quiet=quiet, **inputs)
-        with watch(quiet=quiet) as monitor:
+        with ending_on_sigterm(), watch(quiet=quiet) as monitor:
             made = plan(job, monitor, has_preflight=True).to_dict()
     if as_json:
         click.echo(json.dumps(made, indent=2))

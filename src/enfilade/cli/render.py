@@ -85,7 +85,8 @@ def command(
     from enfilade.runs.render import prepare, render
 
     if is_prepared:
-        prepare(job, folder, has_preflight=True)
+        with watch(quiet=quiet) as monitor:
+            prepare(job, folder, monitor, has_preflight=True)
         begun = {"folder": str(folder), "method": job.method, "frames": len(job.path)}
         click.echo(json.dumps(begun, indent=2) if as_json else f"run     {folder}")
         return

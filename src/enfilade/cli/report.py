@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from enfilade.cli.group import debug_option
-from enfilade.cli.options import quiet_option
+from enfilade.cli.group import debug_option, ending_on_sigterm
+from enfilade.cli.options import check_suffix, quiet_option
 
 
 @click.command("report", short_help="A run as one HTML page: frames, layers, charts, tables.")
@@ -50,12 +50,13 @@ def command(
 
     The page needs neither other files nor a network. A running run is shown as far as it is finished.
     """
+    check_suffix("--out", file, ".html")
     from enfilade.cli.progress import watch
     from enfilade.device import activate
     from enfilade.reports.page import write_report
 
     activate("auto")
-    with watch(quiet=quiet) as monitor:
+    with ending_on_sigterm(), watch(quiet=quiet) as monitor:
         page = write_report(
             run,
             reference=reference,

@@ -217,6 +217,11 @@ def open_pairs(
             f"neither {sides[0].sequence.name(0)} nor {sides[1].sequence.name(0)} has layers; leave out "
             "--layer, which chooses one of OpenEXR frames"
         )
+    if exposure_ev is not None and not any(is_exr(side.sequence) for side in sides):
+        raise ImageError(
+            f"{sides[0].sequence.name(0)} and {sides[1].sequence.name(0)} are shown as they are; leave out "
+            "--exposure-ev, which is for OpenEXR frames"
+        )
     return Pairs(sides, fps=fps, exposure_ev=exposure_ev)
 
 

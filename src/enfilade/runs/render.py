@@ -14,7 +14,7 @@ from enfilade.files import write_json
 from enfilade.images.codecs import odd_size_note
 from enfilade.images.view import white_of
 from enfilade.methods.base import Task
-from enfilade.monitor import Monitor
+from enfilade.monitor import Monitor, Silence
 from enfilade.runs.delivery import ANALYSIS
 from enfilade.runs.executor import Workers
 from enfilade.runs.folder import RunFolder
@@ -87,15 +87,24 @@ def render(
     return summary
 
 
-def prepare(job: Job, folder: Path, *, has_preflight: bool = False) -> None:
+def prepare(job: Job, folder: Path, monitor: Monitor | None = None, *, has_preflight: bool = False) -> None:
     """Begin a run folder without doing any of its tasks, for commands that share it.
+
+    Parameters
+    ----------
+    job, folder, has_preflight
+        As of :func:`render`.
+    monitor
+        Shown what is to be known of the run.
 
     Raises
     ------
     InputError
         The scene, the settings, or a folder that holds another run.
     """
-    _created(job, folder, has_preflight=has_preflight).close()
+    with _created(job, folder, has_preflight=has_preflight) as run:
+        for note in (*run.notes, *_video_notes(job)):
+            (monitor or Silence()).message(note)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -175,8 +176,10 @@ def _is_kept(run: Path, source: Path, choices: Choices) -> bool:
         The run has begun, and the file or the choices are others.
     """
     if not source.is_file():
+        kept, folder = shlex.quote(str(run / SCENE_FOLDER)), shlex.quote(str(run))
+        again = f"work {folder}" if _has_begun(run) else f"render {kept} --out {folder}"
         raise SceneError(
-            f"there is no file {source}; the run has its scene: `enfilade work {run}` continues without it"
+            f"there is no file {source}; the run has its scene: `enfilade {again}` continues without it"
         )
     changes = Source.read(run / SCENE_FOLDER).differences(source, choices)
     if changes and _has_begun(run):

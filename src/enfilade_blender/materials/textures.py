@@ -43,7 +43,7 @@ CMYK_DEPTH = 32  # bits of a pixel of a JPEG file, which Mitsuba reads with 8 an
 WRAP = {"REPEAT": "repeat", "EXTEND": "clamp", "CLIP": "clamp", "MIRROR": "mirror"}
 FLIP = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])  # Mitsuba's first row is at v = 0
 MISSING = (0.5, 0.5, 0.5)  # of a missing image
-WORLD_FILES = ENVIRONMENT, RENDERED = "environment", "rendered"  # names of the files of the world
+ENVIRONMENT = "environment"  # name of the file of the world
 LONGEST_STEM = 120  # bytes of a file's name, to which a number and an ending are added
 
 
@@ -60,8 +60,7 @@ class Textures:
     def __init__(self, folder: Path, notes: Notes) -> None:
         self._folder, self._notes = folder, notes
         self._names = Identifiers()
-        for name in WORLD_FILES:
-            self._names.unique(name)
+        self._names.unique(ENVIRONMENT)
         self._files: dict[Any, str] = {}
         (folder / "textures").mkdir(exist_ok=True)
 

@@ -96,7 +96,7 @@ def find_blender(program: str = "") -> Blender:
         There is none, or the given one does not work.
     """
     if program:
-        found = _asked(_in_folder(Path(program)))
+        found = _asked(_in_folder(Path(shutil.which(program) or program)))
         if isinstance(found, str):
             raise SceneError(f"{program} can't import scenes: {found}; {INSTALL}")
         return found
