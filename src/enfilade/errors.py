@@ -12,7 +12,7 @@
     │       └── DamagedFileError  a file of it that is missing, or differs from its checksum
     ├── DeviceError               no usable LLVM or CUDA
     ├── NoSpaceError              the disk is full; finished tasks stay
-    └── UnfinishedError           tasks of a run failed and were set aside, or are not done yet
+    └── UnfinishedError           tasks of a run failed and were quarantined, or are not done yet
 
 A message says what is wrong, where, and what to do next.
 """
@@ -78,7 +78,7 @@ class UnfinishedError(EnfiladeError):
     Attributes
     ----------
     tasks : tuple of str
-        Names of those that were set aside, or whose frames are missing.
+        Names of those that were quarantined, or whose frames are missing.
     """
 
     def __init__(self, message: str, tasks: tuple[str, ...] = ()) -> None:

@@ -340,7 +340,7 @@ class LobeRenderer(Renderer, Protocol):
         ...
 
     def has_specular_texture(self) -> bool:
-        """Whether textures colour any specular lobe: :meth:`specular_tint`."""
+        """Whether textures colour the reflection of any metal: :meth:`specular_tint`."""
         ...
 
     def intersect(
@@ -434,11 +434,16 @@ class LobeRenderer(Renderer, Protocol):
         """
         ...
 
-    def specular_tint(self, point: ShadingPoint) -> Any:
-        """Reflectance of specular lobes that textures colour, in the direction of a mirror; Array3f.
+    def specular_tint(self, point: ShadingPoint) -> tuple[Any, Any]:
+        """Rough reflectance of the specular lobes, without noise.
 
-        It has no noise, and is above 0. Light divided by it varies less over a surface than light does. It is
-        1 where no texture colours the lobes, and where they are delta lobes.
+        Light that metal with a texture reflects, divided by it, varies less over the surface.
+
+        Returns
+        -------
+        tint : Array3f
+            That of the texture; of other surfaces one value for each BSDF, 0 where there are no such lobes.
+        is_textured : Bool
         """
         ...
 

@@ -95,7 +95,7 @@ class Viewing:
         return self.distance_m * math.tan(math.radians(1.0)) / self.pixel_pitch_m
 
     def velocity_deg_s(self, flow_px_per_frame: Quantity) -> Quantity:
-        """Image velocity in degrees per second, from image flow in pixels per frame."""
+        """Image velocity in degrees per second, from motion vectors in pixels per frame."""
         return flow_px_per_frame * (self.fps / self.pixels_per_degree)
 
     def cropped(self, width_px: int, height_px: int) -> Viewing:

@@ -92,7 +92,7 @@ def test_none_and_a_single_image_stand_still(sequence):
 def test_layers_that_are_asked_for_have_to_be_there(sequence):
     plain = sequence("plain", [textured()])
     with pytest.raises(
-        ImageError, match=r"neither .*0001\.exr.* has layers of image flow; known are: .*Vector"
+        ImageError, match=r"neither .*0001\.exr.* has layers of motion vectors; known are: .*Vector"
     ):
         compared(plain, plain, flow="layers")
 
@@ -106,7 +106,7 @@ def test_layers_that_end_or_hold_a_nan_name_the_frame(sequence):
     bad = np.zeros((*SIZE, 2), np.float32)
     bad[3, 4] = np.nan
     broken = sequence("broken", [textured()], layers={"forward": bad, "backward": bad})
-    with pytest.raises(ImageError, match=r"0001\.exr has NaN or infinite values in its image flow"):
+    with pytest.raises(ImageError, match=r"0001\.exr has NaN or infinite values in its motion vectors"):
         compared(broken, broken)
 
 

@@ -1,4 +1,4 @@
-"""Tasks that fail are tried again, set aside, or done with fewer paths; damaged files are made again."""
+"""Tasks that fail are tried again, quarantined, or done with fewer paths; damaged files are made again."""
 
 from __future__ import annotations
 
@@ -52,13 +52,13 @@ def test_attempts_are_some_time_apart(tmp_path, rendered, monkeypatch):
     assert slept == [7.0, 50.0]  # all other tasks that could be done are done
 
 
-def test_a_task_that_fails_again_and_again_is_set_aside(tmp_path, rendered, whole):
+def test_a_task_that_fails_again_and_again_is_quarantined(tmp_path, rendered, whole):
     order(tmp_path, light_2="raise raise raise")
     monitor = Recorder()
     with pytest.raises(UnfinishedError, match=r"1 tasks failed 3 times each: light 2 .*7 more") as error:
         rendered(monitor=monitor)
     assert error.value.tasks == ("light 2",)
-    assert "light 2: ZeroDivisionError: by nought; it is set aside" in monitor.said
+    assert "light 2: ZeroDivisionError: by nought; it is quarantined" in monitor.said
     log = (tmp_path / "run" / "failed" / "light-2.log").read_text()
     assert log.count("Traceback") == 3
     assert "attempt 3: ZeroDivisionError: by nought" in log

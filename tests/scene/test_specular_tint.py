@@ -6,7 +6,7 @@ import pytest
 
 from enfilade.arrays import Array3f, Float, rows
 from enfilade.renderer import Rays
-from support.mitsuba_scene import opened, placed, rgb, write
+from support.mitsuba_scene import HOLES, opened, placed, rgb, write, write_holes
 
 DARK, BRIGHT = 0.3, 0.9  # of the left half of each texture, and of the right one
 CHECKS = (
@@ -20,37 +20,53 @@ PRINCIPLED = (
     f'<bsdf type="principled">{CHECKS.format("base_color")}<float name="metallic" value="{{}}"/>'
     '<float name="roughness" value="0.5"/></bsdf>'
 )
+SLOPES = HOLES.format("bump", "bilinear")
 TEXTURED = {
     "metal": METAL,
+    "mirror": f'<bsdf type="conductor">{CHECKS.format("specular_reflectance")}</bsdf>',
     "two-sided": f'<bsdf type="twosided">{METAL}</bsdf>',
     "principled": PRINCIPLED.format(1.0),
+    "bumpy": f'<bsdf type="bumpmap">{SLOPES}{PRINCIPLED.format(1.0)}</bsdf>',
+    "cut-out": f'<bsdf type="mask"><float name="opacity" value="0.7"/>{METAL}</bsdf>',
 }
 OTHERS = {
     "plain metal": '<bsdf type="roughconductor"/>',
     "plain principled": '<bsdf type="principled"><float name="metallic" value="1"/></bsdf>',
     "principled without metal": PRINCIPLED.format(0.0),
     "plastic": f'<bsdf type="roughplastic">{CHECKS.format("diffuse_reflectance")}</bsdf>',
-    "mirror": f'<bsdf type="conductor">{CHECKS.format("specular_reflectance")}</bsdf>',
+    "translucent": f'<bsdf type="principledthin">{CHECKS.format("base_color")}'
+    '<float name="diff_trans" value="1"/></bsdf>',
+    "blend": f'<bsdf type="blendbsdf"><float name="weight" value="0.5"/><bsdf type="diffuse"/>{METAL}</bsdf>',
 }
 
 
 def tints(folder, bsdf):
-    """Whether a renderer has tints, and that of both halves of a wall, (2, 3)."""
+    """Whether a renderer has textured metal; tints of both halves of a wall, and if from textures."""
+    write_holes(folder)
     renderer = opened(write(folder, placed("rectangle", "wall", (0, 0, 0), bsdf)))
     x = Float(-0.1, 0.1)
     rays = Rays(Array3f(x, 0.05, 3.0), Array3f(0.0, 0.0, -1.0) + dr.zeros(Array3f, 2))
-    return renderer.has_specular_texture(), rows(renderer.specular_tint(renderer.intersect(rays)))
+    tint, is_textured = renderer.specular_tint(renderer.intersect(rays))
+    return renderer.has_specular_texture(), rows(tint), np.array(is_textured)
 
 
 @pytest.mark.parametrize("name", TEXTURED)
-def test_it_is_proportional_to_the_texture(tmp_path, name):
-    has_texture, found = tints(tmp_path, TEXTURED[name])
+def test_it_is_that_of_the_texture(tmp_path, name):
+    has_texture, found, is_textured = tints(tmp_path, TEXTURED[name])
     assert has_texture
-    np.testing.assert_allclose(found.max(axis=0) / found.min(axis=0), BRIGHT / DARK, rtol=0.01)
+    assert is_textured.all()
+    np.testing.assert_allclose(np.sort(found, axis=0), [[DARK] * 3, [BRIGHT] * 3], rtol=1e-5)
 
 
 @pytest.mark.parametrize("name", OTHERS)
-def test_it_is_one_where_no_texture_colours_a_lobe(tmp_path, name):
-    has_texture, found = tints(tmp_path, OTHERS[name])
-    assert has_texture == (name == "mirror")
-    np.testing.assert_array_equal(found, 1.0)
+def test_others_have_one_value(tmp_path, name):
+    has_texture, found, is_textured = tints(tmp_path, OTHERS[name])
+    assert has_texture == (name == "blend")  # the metal in it
+    assert not is_textured.any()
+    np.testing.assert_array_equal(found, found[0, 0])
+    assert 0.01 <= found[0, 0] <= 1.0
+
+
+def test_it_is_zero_where_nothing_is_specular(tmp_path):
+    _, found, _ = tints(tmp_path, '<bsdf type="diffuse"/>')
+    np.testing.assert_array_equal(found, 0.0)

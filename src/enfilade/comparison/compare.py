@@ -32,8 +32,6 @@ class ComparedFrame:
 
     Attributes
     ----------
-    index : int
-        From 0.
     difference : FrameDifference
     jnd : (H, W) float32
         Map of visible differences.
@@ -41,7 +39,6 @@ class ComparedFrame:
         Luminance of the reference, encoded for an sRGB display, 0..1.
     """
 
-    index: int
     difference: FrameDifference
     jnd: F32
     grey: F32
@@ -209,7 +206,7 @@ class _Comparer:
             values.append(measure.measure(pair))
         speed = 0.0 if velocity is None else float(np.hypot(velocity[..., 0], velocity[..., 1]).mean())
         difference = _difference(pair, found, speed)
-        return ComparedFrame(pair.index, difference, found.jnd, pair.reference_grey)
+        return ComparedFrame(difference, found.jnd, pair.reference_grey)
 
     def noise_floor(self) -> NoiseFloor | None:
         if not self._floor:

@@ -1,4 +1,4 @@
-"""Sources of the image flow of a compared sequence: layers of its frames, an estimate, or none."""
+"""Sources of the motion vectors of a compared sequence: layers of its frames, an estimate, or none."""
 
 from __future__ import annotations
 
@@ -89,13 +89,13 @@ def open_motion(
                 return _FromLayers(sequence, kind, role, starts)
     if choice == "layers":
         raise ImageError(
-            f"neither {reference.name(0)} nor {test.name(0)} has layers of image flow; known are: "
+            f"neither {reference.name(0)} nor {test.name(0)} has layers of motion vectors; known are: "
             f"{'; '.join(kind.text for kind in KINDS)}. --flow estimate needs none"
         )
     if choice == "none":
-        return _Still("image flow: none; the sequences are compared as static", starts)
+        return _Still("motion vectors: none; the sequences are compared as static", starts)
     if len(reference) == 1:
-        return _Still("image flow: none in a single image; it is compared as static", starts)
+        return _Still("motion vectors: none in a single image; it is compared as static", starts)
     return _Estimated(reference.width, reference.height, starts)
 
 
@@ -182,7 +182,7 @@ class _FromLayers:
         self._sequence = sequence
         self._kind = kind
         self._starts = starts
-        self.text = f"image flow: from the {role}'s layers {kind.text}"
+        self.text = f"motion vectors: from the {role}'s layers {kind.text}"
 
     def follow(self, pairs: Iterable[Pair]) -> Iterator[tuple[Pair, Moved]]:
         """Pairs with the flow of their layers.
@@ -217,7 +217,7 @@ class _FromLayers:
             raise ImageError(f"{name} has no layers {self._kind.text}, which the first frame has")
         if not np.isfinite(flow.motion).all():
             raise ImageError(
-                f"{name} has NaN or infinite values in its image flow; --flow estimate needs none of it"
+                f"{name} has NaN or infinite values in its motion vectors; --flow estimate needs none of it"
             )
         if self._starts is None:
             return flow
@@ -233,8 +233,8 @@ class _Estimated:
         self._estimator = FlowEstimator(width, height)
         self._starts = starts
         self.text = (
-            "image flow: no layers of it, so it is estimated from the reference (dense inverse search); "
-            "--flow none compares them as static"
+            "motion vectors: no layers of them, so they are estimated from the reference (dense inverse "
+            "search); --flow none compares them as static"
         )
 
     def follow(self, pairs: Iterable[Pair]) -> Iterator[tuple[Pair, Moved]]:

@@ -106,21 +106,14 @@ CODECS = {
 }  # fmt: skip
 
 
-def codec_named(name: str) -> Codec:
-    """Codec of a setting; SettingsError if there is none of that name."""
-    if name not in CODECS:
-        raise SettingsError(f"unknown [video] codec {name!r}; known are: {', '.join(CODECS)}")
-    return CODECS[name]
-
-
 def video_suffix(codec: str) -> str:
-    """Suffix of a video file, with its dot; SettingsError if there is no such codec."""
-    return codec_named(codec).suffix
+    """Suffix of a video file, with its dot."""
+    return CODECS[codec].suffix
 
 
 def odd_size_note(codec: str, width: int, height: int) -> str:
     """Note that few players show a video of odd width or height, with the next smaller even size; or ""."""
-    known = codec_named(codec)
+    known = CODECS[codec]
     if known.pixel_format_for(width, height) == known.pixel_format:
         return ""
     return (

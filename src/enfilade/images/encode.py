@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from enfilade.errors import ImageError
-from enfilade.images.codecs import Codec, codec_named
+from enfilade.images.codecs import CODECS, Codec
 from enfilade.images.container import written_container
 from enfilade.images.view import ViewTransform, open_view
 from enfilade.images.ycbcr import FULL_RANGE, LIMITED_RANGE, Plane, frame_of, planes_from_rgb, quantized
@@ -114,7 +114,7 @@ def _chosen(
     settings: VideoSettings, fps: float | Fraction, size: tuple[int, int], exposure_ev: float
 ) -> tuple[Codec, str, dict[str, str], ViewTransform, Fraction]:
     """Codec, pixel format, options of the encoder, view and frame rate, all checked."""
-    codec, rate = codec_named(settings.codec), exact_fps(fps)
+    codec, rate = CODECS[settings.codec], exact_fps(fps)
     pixel_format, options = codec.pixel_format_for(*size), codec.options_for(settings.quality)
     codec.check_rate(rate)
     return codec, pixel_format, options, open_view(settings, exposure_ev), rate

@@ -18,7 +18,7 @@ def place_keyframes(
     Parameters
     ----------
     speed : (N,) float64
-        Mean magnitude of the image flow of each frame of the shot, in any unit.
+        Mean magnitude of the motion vectors of each frame of the shot, in any unit.
     settings
         Spacing Delta, coefficient A, and the rule of placement.
     spreads_rest

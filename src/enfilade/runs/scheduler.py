@@ -27,8 +27,8 @@ from enfilade.settings import LimitSettings
 ATTEMPTS = 3  # at a task, and at a file that is found damaged again and again
 DELAYS_S = (1.0, 10.0)  # before the second and the third
 REDUCTION = 4  # of the paths in flight, after a lack of memory
-SET_ASIDE_IN_A_ROW = 4  # tasks without a success between them, after which the run ends
-FAILED = "failed"  # folder of the logs of tasks that were set aside
+QUARANTINED_IN_A_ROW = 4  # tasks without a success between them, after which the run ends
+FAILED = "failed"  # folder of the logs of tasks that were quarantined
 SHOWN = 5  # tasks named in a message
 
 Chosen = Callable[[Sequence[Task]], list[Task]]  # those tasks of a run that this command does
@@ -90,7 +90,7 @@ def work(
     Raises
     ------
     UnfinishedError
-        Some tasks failed again and again and were set aside; the rest is done.
+        Some tasks failed again and again and were quarantined; the rest is done.
     NoSpaceError
         The disk is full. All finished tasks stay.
     EnfiladeError
@@ -212,7 +212,7 @@ class _Loop:
         self.reduction = reduction  # of the paths in flight, after a lack of memory
         self._failures: dict[TaskId, list[Failure]] = {}
         self._delayed: list[tuple[float, TaskId, Task]] = []
-        self._set_aside: list[Task] = []
+        self._quarantined: list[Task] = []
         self._in_a_row = 0
 
     def run(self) -> str | None:
@@ -281,19 +281,19 @@ class _Loop:
             heapq.heappush(self._delayed, (until, task.id, task))
             return
         self._graph.give_up(task)
-        self._set_aside.append(task)
+        self._quarantined.append(task)
         self._in_a_row += 1
         self._write_log(task, failures)
-        self._monitor.message(f"{self._name(task)}: {failure.text}; it is set aside")
-        if self._in_a_row >= SET_ASIDE_IN_A_ROW:
+        self._monitor.message(f"{self._name(task)}: {failure.text}; it is quarantined")
+        if self._in_a_row >= QUARANTINED_IN_A_ROW:
             self._report()
 
     def _report(self) -> None:
-        """Raise an error if tasks were set aside."""
-        if not self._set_aside:
+        """Raise an error if tasks were quarantined."""
+        if not self._quarantined:
             return
-        names = [self._name(task) for task in self._set_aside]
-        last = self._failures[self._set_aside[-1].id][-1]
+        names = [self._name(task) for task in self._quarantined]
+        last = self._failures[self._quarantined[-1].id][-1]
         raise UnfinishedError(
             f"{len(names)} tasks failed {ATTEMPTS} times each: {shortened(names)} ({last.text}); their logs "
             f"are in {self._run.folder / FAILED}. {len(self._graph.unfinished)} more tasks are left; the "

@@ -78,7 +78,7 @@ class PathKernels:
     see
         Camera rays, and the irradiance in their view.
     see_tint
-        Camera rays, and the reflectance of specular lobes that textures colour.
+        Camera rays, and the tint of specular lobes.
     see_aovs
         Camera rays, and filtered specular AOVs.
     extend
@@ -113,10 +113,9 @@ class PathKernels:
         emitted, vertex = self._intersect(cache, path)
         return replace(vertex, radiance=emitted + vertex.radiance)
 
-    def _see_tint(self, path: Path) -> Any:
-        """Camera rays: intersect, and evaluate the tint of specular lobes; Array3f."""
-        point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
-        return Array3f(self._renderer.specular_tint(point))
+    def _see_tint(self, path: Path) -> tuple[Any, Any]:
+        """Camera rays: intersect, and evaluate the tint of specular lobes; whether it is a texture's."""
+        return self._renderer.specular_tint(self._renderer.intersect(path.rays, path.bounce, path.is_active))
 
     def _see_aovs(self, aovs: UploadedImage, unit: Any, path: Path) -> tuple[Any, ...]:
         """Camera rays: intersect, and look up the AOVs; whether they miss a surface with specular lobes."""

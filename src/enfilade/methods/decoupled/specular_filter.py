@@ -10,14 +10,13 @@ import drjit as dr
 import numpy as np
 import scipy.ndimage
 
-from enfilade.arrays import Array3f, Array3f16, Float, image, lanes, to_float, to_half
-from enfilade.kernels.tone import luminance
+from enfilade.arrays import Array3f, Array3f16, Float, image, lanes
 from enfilade.methods.decoupled.denoising import denoise_light
 from enfilade.methods.decoupled.records import SpecularAov
 from enfilade.methods.decoupled.surface_image import UploadedImage, upload_layers
 from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
 from enfilade.methods.decoupled.wavelet import firefly_weights, smooth_along
-from enfilade.records import F32, Geometry, Mask, Shading
+from enfilade.records import Geometry, Mask, Shading
 
 DENOISER = "fast"  # quality: what it leaves is averaged over frames
 NOISE_SHARE = 0.5  # of the samples' variance: low-discrepancy samples have less noise than it tells
@@ -28,13 +27,7 @@ FIREFLY = 2.0  # times the brightest neighbour: brighter pixels are fireflies
 
 
 def filter_spatially(
-    virtual: Sequence[Geometry],
-    aovs: Sequence[Shading],
-    where: Mask,
-    tints: tuple[F32, F32] | None = None,
-    *,
-    is_denoised: bool,
-    unit: float,
+    virtual: Sequence[Geometry], aovs: Sequence[Shading], where: Mask, *, is_denoised: bool, unit: float
 ) -> list[SpecularAov]:
     """Denoise specular AOVs, or smooth them along the surfaces that are seen in them by the wavelet filter.
 
@@ -46,9 +39,6 @@ def filter_spatially(
         Of shape (H, W).
     where : (H, W) bool
         Pixels that were sampled; others do not contribute.
-    tints : pair of (H, W, 3) float32
-        Of the first AOV, so that textures stay sharp: it is divided by the one, and multiplied by the other
-        afterwards. None: by neither.
     is_denoised
         Whether to use the denoiser.
     unit
@@ -58,15 +48,6 @@ def filter_spatially(
     -------
     list of SpecularAov
     """
-    # Divide the reflection by its tint: what is left varies less.
-    if tints is not None:
-        sampled, tint = tints
-        variance = (aovs[0].variance / np.square(luminance(sampled))).astype(np.float32)
-        divided = [Shading(aovs[0].color / sampled, variance, aovs[0].dropped), *aovs[1:]]
-        first, *others = filter_spatially(virtual, divided, where, is_denoised=is_denoised, unit=unit)
-        color, deviation = to_float(first.color) * tint, to_float(first.deviation) * luminance(tint)
-        return [SpecularAov(to_half(color), to_half(deviation)), *others]
-
     # Ignore the depths of virtual images: their normals are not those of the planes that they appear to form.
     surfaces = [
         replace(g, depth=np.where(g.shape_index < IN_VIRTUAL_IMAGE, g.depth, np.float32(0))) for g in virtual

@@ -26,12 +26,11 @@ from enfilade.methods.decoupled.records import SpecularAov
 from enfilade.methods.decoupled.sample_counts import specular_spp
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.specular_filter import filter_spatially, upload_aovs, with_edges
+from enfilade.methods.decoupled.specular_tint import find_tint
 from enfilade.methods.decoupled.surface_edges import narrow_surfaces, surface_edges
 from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
 from enfilade.records import F32, Geometry, Mask
 from enfilade.renderer import PixelFilter, Purpose
-
-TINT_RAYS = 16  # camera rays of a pixel
 
 
 def shade_specular(
@@ -93,13 +92,17 @@ def shade_specular(
     del estimate  # its sums take 80 bytes a pixel
     release_memory()
 
-    # Filter the AOVs along the surfaces that are seen in them.
+    # Filter the AOVs along the surfaces that are seen in them, without the texture of metal.
+    tint = find_tint(shot, frame, where, is_centre, is_narrow, spp)
+    if tint:
+        traced[0] = tint.divided(traced[0])
     used = 1 + max((k for k, aov in enumerate(traced) if aov.color.any()), default=0)
     is_denoised = shot.settings.denoiser != "none"
-    tints = _tints(shot, frame, where, is_centre, spp) if shot.renderer.has_specular_texture() else None
     aovs = filter_spatially(
-        virtual[:used], traced[:used], where, tints, is_denoised=is_denoised, unit=shot.stored_unit
+        virtual[:used], traced[:used], where, is_denoised=is_denoised, unit=shot.stored_unit
     )
+    if tint:
+        aovs[0] = tint.multiplied(aovs[0])
     del traced
 
     # Choose the edges: those in mirrors and panes, surfaces that centres miss, and those between surfaces
@@ -147,31 +150,6 @@ class SpecularShading:
     is_refined: Mask
     variance: F32
     count: RayCount
-
-
-def _tints(shot: ShotContext, frame: int, where: Mask, centred: Mask, spp: int) -> tuple[F32, F32]:
-    """Mean tints of the specular lobes over the pixels, (H, W, 3); 1 elsewhere.
-
-    By the first `spp` camera rays of a pixel, which its specular rays continue, and by :data:`TINT_RAYS`.
-    """
-    see = shot.integrator.kernels.see_tint
-    estimate = shot.estimate(
-        shot.walk.view(frame).geometry.camera,
-        where,
-        lambda rays, sampler: see(shot.spawn(frame, rays, sampler)),
-        shot.walk.random(frame, Purpose.SPECULAR),
-        pixel_filter=PixelFilter.GAUSSIAN,
-        layers=1,
-        centred=centred,
-    )
-
-    def tint() -> F32:
-        return np.where(where[..., None], estimate.shading.to_image(where).color, np.float32(1))
-
-    estimate.add(spp)
-    sampled = tint()
-    estimate.add(max(TINT_RAYS - spp, 0))
-    return sampled, tint()
 
 
 def _looked_up(

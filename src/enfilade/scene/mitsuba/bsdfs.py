@@ -10,7 +10,6 @@ import numpy as np
 
 from enfilade.scene.mitsuba.shapes import has_lobe
 
-COLORS = {"base_color", "specular_reflectance"}  # parameters that colour specular lobes
 MAPS = {"BumpMap", "NormalMap"}
 WRAPPERS = {"MaskBSDF", *MAPS}  # their albedo is that of the BSDF nested in them
 GLASS = {"spec_trans": 1.0, "metallic": 0.0, "clearcoat": 0.0}  # parameters of a `principled` interface
@@ -62,15 +61,22 @@ def is_narrow(bsdf: Any) -> bool:
     )
 
 
-def is_tinted(bsdf: Any) -> bool:
-    """Whether a texture colours the specular lobes of a BSDF or of one nested in it."""
-    if bsdf.class_name() == "Principled" and constant(bsdf, "metallic") == 0.0:
-        return False
-    own = any(
-        name in COLORS and rest and rest != "value"
-        for name, _, rest in (key.partition(".") for key, _ in mi.traverse(bsdf))
-    )
-    return own or any(map(is_tinted, nested(bsdf)))
+def is_textured(bsdf: Any, name: str) -> bool:
+    """Whether a parameter of a BSDF is a texture."""
+    return any(key.startswith(f"{name}.") and key != f"{name}.value" for key, _ in mi.traverse(bsdf))
+
+
+def is_textured_metal(bsdf: Any) -> bool:
+    """Whether a texture colours the reflection of a metal."""
+    match bsdf.class_name():
+        case "Principled":
+            parameters = ("base_color", "metallic")
+            return constant(bsdf, "metallic") != 0.0 and any(is_textured(bsdf, name) for name in parameters)
+        case "SmoothConductor" | "RoughConductor":
+            return is_textured(bsdf, "specular_reflectance")
+        case "TwoSidedBRDF" | "MaskBSDF" | "BumpMap" | "NormalMap":
+            return any(map(is_textured_metal, nested(bsdf)))
+    return False
 
 
 def mixes_delta_lobes(bsdf: Any) -> bool:

@@ -21,7 +21,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from enfilade.arrays import Array3f, Bool, Float, UInt, lanes
+from enfilade.arrays import Bool, Float, UInt, lanes
 from enfilade.kernels.random import one_sequence
 from enfilade.renderer import Branch
 from enfilade.scene.mitsuba.bsdfs import (
@@ -29,7 +29,7 @@ from enfilade.scene.mitsuba.bsdfs import (
     classes,
     is_diffuse_on,
     is_narrow,
-    is_tinted,
+    is_textured_metal,
     is_turned,
     mixes_delta_lobes,
     rough_ior,
@@ -43,7 +43,8 @@ LAMBERTIAN = {"MaskBSDF", "TwoSidedBRDF", "SmoothDiffuse"}  # of these alone: La
 
 COATED = {"SmoothPlastic", "TwoSidedBRDF"}  # of these alone: a smooth coat over a Lambertian lobe
 CLEAR = {"SmoothDielectric", "ThinDielectric"}
-MIN_TINT = 0.01  # below it a texture is taken to be as dark
+DIELECTRIC_TINT = 0.04  # reflectance of what is no metal
+MIN_TINT = 0.01  # of specular lobes
 ALMOST_ONE = 1.0 - 2.0**-24
 
 ALBEDO_BINS = 16  # of a BSDF's specular albedo, by the cosine of the viewer's direction, -1..1
@@ -84,8 +85,8 @@ class Lobes:
         self._rough_ior = bsdf_table(scene, rough_ior, Float)
         self._narrow = bsdf_table(scene, is_narrow)
         self._coated = bsdf_table(scene, lambda bsdf: classes(bsdf) <= COATED)
-        self._tinted = bsdf_table(scene, is_tinted)
-        self.has_tinted = bool(dr.any(self._tinted))
+        self._textured_metal = bsdf_table(scene, is_textured_metal)
+        self.has_textured_metal = bool(dr.any(self._textured_metal))
         self.has_coats = bool(dr.any(self._coated))
         self._has_whole = bool(dr.any(self._whole))
         self._mixed = bsdf_table(scene, mixes_delta_lobes)
@@ -96,7 +97,7 @@ class Lobes:
     def state(self) -> Any:
         """Arrays that the methods read, but for that of `specular_albedo`."""
         albedos = self._bases, self._turned, self._masked
-        interfaces = self._clear, self._rough_ior, self._narrow, self._coated, self._tinted
+        interfaces = self._clear, self._rough_ior, self._narrow, self._coated, self._textured_metal
         return self._whole, self._lambertian, self._sides, self._mixed, interfaces, albedos
 
     def has_specular(self, si: Any, bsdf: Any) -> Any:
@@ -128,9 +129,7 @@ class Lobes:
 
         # Look through masks and maps, along the normal: below a coat that is seen at a grazing angle the
         # albedo would be nearly 0, while a map's slopes reflect more.
-        base: Any = dr.reinterpret_array(
-            mi.BSDFPtr, dr.select(is_front, *(_of(table, si, bsdf) for table in self._bases))
-        )
+        base = self._base(si, bsdf)
         is_outside = is_front | _of(self._turned, si, bsdf)
         along_normal = mi.Vector3f(0.0, 0.0, dr.select(is_outside, mi.Float(1.0), -1.0))
         inner = mi.SurfaceInteraction3f(si)
@@ -151,6 +150,12 @@ class Lobes:
             albedo *= dr.select(is_masked, _opacity(si, bsdf, is_masked), 1.0)
         parts = (albedo.x, albedo.y, albedo.z)
         return mi.Color3f(*(dr.select(is_diffuse & dr.isfinite(c), dr.clip(c, 0.0, 1.0), 0.0) for c in parts))
+
+    def _base(self, si: Any, bsdf: Any) -> Any:
+        """The BSDFs below masks and maps, on the viewer's side."""
+        numbers = (_of(table, si, bsdf) for table in self._bases)
+        base: Any = dr.reinterpret_array(mi.BSDFPtr, dr.select(si.wi.z > 0.0, *numbers))
+        return base
 
     def eval_diffuse(self, si: Any, bsdf: Any, wo: Any, active: Any) -> tuple[Any, Any]:
         """Diffuse lobe times cosine, and the density of :meth:`sample_diffuse`."""
@@ -178,15 +183,23 @@ class Lobes:
         difference, mixture_pdf = self._difference(si, bsdf, wo, albedo, active & is_whole)
         return dr.select(is_whole, difference, value), dr.select(is_whole, mixture_pdf, pdf)
 
-    def specular_tint(self, si: Any, bsdf: Any, active: Any) -> Any:
-        """Reflectance of specular lobes that textures colour, in the direction of a mirror; Array3f.
+    def specular_tint(self, si: Any, bsdf: Any, active: Any) -> tuple[Any, Any]:
+        """Rough reflectance of the specular lobes, Color3f, and whether textures of a metal colour it.
 
-        It is 1 elsewhere, and for delta lobes.
+        It does not depend on the viewer, nor on the slopes of a map. Other surfaces than such metals have a
+        mean of their BSDF, and those that are not active 0.
         """
-        is_tinted = active & _of(self._tinted, si, bsdf)
-        value, pdf = self.eval_specular(si, bsdf, mi.reflect(si.wi), is_tinted)
-        tint = dr.maximum(Array3f(value) / pdf, MIN_TINT)
-        return dr.select(is_tinted & (pdf > 0.0), tint, 1.0)
+        base = self._base(si, bsdf)
+        is_textured = active & _of(self._textured_metal, si, bsdf)
+        is_principled = is_textured & base.has_attribute("base_color", is_textured)
+        is_conductor = is_textured & ~is_principled
+        color = base.eval_attribute("base_color", si, is_principled)
+        metallic = base.eval_attribute_1("metallic", si, is_principled)
+        conductor = base.eval_attribute("specular_reflectance", si, is_conductor)
+        metal = dr.select(is_principled, dr.lerp(DIELECTRIC_TINT, color, metallic), conductor)
+        plain = dr.gather(Float, self.specular_albedos, _albedo_entry(_number(bsdf), Float(1)), active)
+        tint = dr.maximum(dr.select(is_textured, metal, mi.Color3f(dr.minimum(plain, 1.0))), MIN_TINT)
+        return dr.select(active, tint, 0.0), is_textured
 
     def is_clear(self, si: Any, bsdf: Any) -> Any:
         """Whether a BSDF is a clear interface: it reflects or transmits, in one direction each."""

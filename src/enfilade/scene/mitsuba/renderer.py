@@ -183,7 +183,7 @@ class MitsubaRenderer:
 
     def has_specular_texture(self) -> bool:
         """See :meth:`enfilade.renderer.LobeRenderer.has_specular_texture`."""
-        return self._lobes.has_tinted
+        return self._lobes.has_textured_metal
 
     def intersect(
         self,
@@ -239,9 +239,11 @@ class MitsubaRenderer:
         """See :meth:`enfilade.renderer.LobeRenderer.coat_emission`."""
         return self._transport.coat_emission(point)
 
-    def specular_tint(self, point: ShadingPoint) -> Any:
+    def specular_tint(self, point: ShadingPoint) -> tuple[Any, Any]:
         """See :meth:`enfilade.renderer.LobeRenderer.specular_tint`."""
-        return self._lobes.specular_tint(point.native, point.native.bsdf(), point.has_specular)
+        si = point.native
+        tint, is_textured = self._lobes.specular_tint(si, si.bsdf(), point.has_specular)
+        return Array3f(tint), Bool(is_textured)
 
     def sample_diffuse(
         self, point: ShadingPoint, sampler: Any, *, soft_only: bool = False, guide: PathGuide | None = None
