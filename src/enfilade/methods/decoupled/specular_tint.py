@@ -8,9 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+import drjit as dr
 import numpy as np
 
-from enfilade.arrays import to_float, to_half
+from enfilade.arrays import Array3f, to_float, to_half
 from enfilade.kernels.estimate import Samples
 from enfilade.kernels.tone import luminance
 from enfilade.methods.decoupled.records import SpecularAov
@@ -19,12 +20,11 @@ from enfilade.records import F32, Mask, Shading
 from enfilade.renderer import PixelFilter, Purpose, Rays
 
 TINT_RAYS = 16  # camera rays of a pixel that shows metal with a texture
-MIN_TINT = np.float32(1e-3)  # mean of a pixel
 
 
 @dataclass(frozen=True, eq=False)
 class Tint:
-    """Mean tints of the specular lobes over the pixels.
+    """Mean tints of the specular lobes in the pixels.
 
     Attributes
     ----------
@@ -72,11 +72,15 @@ def find_tint(
 
     def radiance(rays: Rays, sampler: Any) -> Samples:
         tint, is_textured = see(shot.spawn(frame, rays, sampler))
-        return Samples((tint,), is_textured)
+        is_specular = dr.select(dr.max(tint) > 0.0, Array3f(1), 0.0)
+        return Samples((tint, is_specular), is_textured)
 
     def mean() -> F32:
-        tint = np.maximum(estimate.shading.to_image(where).color, MIN_TINT)
-        return np.where(where[..., None], tint, np.float32(1))
+        """Of rays that meet specular lobes; the mean of all pixels where none does."""
+        tint, coverage = (of.to_image(where).color for of in estimate.shadings)
+        is_known = coverage > 0.0
+        average = tint.sum(axis=(0, 1)) / coverage.sum(axis=(0, 1))
+        return np.where(is_known, tint / np.where(is_known, coverage, np.float32(1)), average)
 
     estimate = shot.estimate(
         shot.walk.view(frame).geometry.camera,
@@ -84,7 +88,6 @@ def find_tint(
         radiance,
         shot.walk.random(frame, Purpose.SPECULAR),
         pixel_filter=PixelFilter.GAUSSIAN,
-        layers=1,
         centred=centred,
     )
     estimate.add(spp)

@@ -186,8 +186,8 @@ class Lobes:
     def specular_tint(self, si: Any, bsdf: Any, active: Any) -> tuple[Any, Any]:
         """Rough reflectance of the specular lobes, Color3f, and whether textures of a metal colour it.
 
-        It does not depend on the viewer, nor on the slopes of a map. Other surfaces than such metals have a
-        mean of their BSDF, and those that are not active 0.
+        It does not depend on the slopes of a map. Other surfaces than such metals have a mean of their BSDF,
+        and those that are not active 0.
         """
         base = self._base(si, bsdf)
         is_textured = active & _of(self._textured_metal, si, bsdf)
@@ -196,7 +196,10 @@ class Lobes:
         color = base.eval_attribute("base_color", si, is_principled)
         metallic = base.eval_attribute_1("metallic", si, is_principled)
         conductor = base.eval_attribute("specular_reflectance", si, is_conductor)
-        metal = dr.select(is_principled, dr.lerp(DIELECTRIC_TINT, color, metallic), conductor)
+        # Schlick's approximation, as of `principled`: at grazing angles the texture has less contrast.
+        grazing = dr.power(1.0 - dr.minimum(dr.abs(si.wi.z), 1.0), 5.0)
+        principled = dr.lerp(dr.lerp(DIELECTRIC_TINT, color, metallic), 1.0, grazing)
+        metal = dr.select(is_principled, principled, conductor)
         plain = dr.gather(Float, self.specular_albedos, _albedo_entry(_number(bsdf), Float(1)), active)
         tint = dr.maximum(dr.select(is_textured, metal, mi.Color3f(dr.minimum(plain, 1.0))), MIN_TINT)
         return dr.select(active, tint, 0.0), is_textured
