@@ -435,7 +435,7 @@ class LobeRenderer(Renderer, Protocol):
         ...
 
     def specular_tint(self, point: ShadingPoint) -> tuple[Any, Any]:
-        """Rough reflectance of the specular lobes, without noise.
+        """Approximate reflectance of the specular lobes, without noise.
 
         Light that metal with a texture reflects, divided by it, varies less over the surface.
 

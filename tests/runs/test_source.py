@@ -107,7 +107,7 @@ def test_wrong_files_leave_no_folder(tables, tmp_path):
     assert not (tmp_path / "run").exists()
 
 
-def test_the_scene_of_a_lost_file_is_rendered_as_the_message_says(shot, tables, tmp_path):
+def test_a_lost_file_is_an_error_that_says_how_to_continue(shot, tables, tmp_path):
     run, source = tmp_path / "my run", shot()
     imported(source, run, tables)
     source.unlink()

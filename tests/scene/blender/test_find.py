@@ -34,6 +34,15 @@ def test_a_given_program_wins(tmp_path):
     ]  # fmt: skip
 
 
+def test_a_given_name_is_looked_for_on_path(tmp_path, monkeypatch):
+    on_path = answering(tmp_path / "path" / "blender-4.5", "Blender 4.5.1 LTS")
+    assert find_blender("blender-4.5").program == on_path
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    answering(tmp_path / "here" / "blender-4.5" / "blender", "Blender 4.5.3 LTS")
+    assert find_blender("blender-4.5").version == "4.5.3"
+
+
 def test_blender_on_path_comes_before_the_environment(tmp_path):
     on_path = answering(tmp_path / "path" / "blender", "Blender 4.2.0")
     answering(tmp_path / "data" / "enfilade" / "blender" / "bin" / "python", "Blender 4.5.1")

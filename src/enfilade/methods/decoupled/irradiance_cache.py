@@ -65,10 +65,22 @@ class IrradianceCache:
     depth_weights: DepthWeights = UNWEIGHTED
 
     @staticmethod
-    def of(images: Sequence[UploadedImage], weights: Sequence[float], **others: Any) -> IrradianceCache:
-        """A cache of some images with their weights, and other attributes."""
+    def of(
+        images: Sequence[UploadedImage],
+        weights: Sequence[float],
+        hash_grid: HashGrid | None = None,
+        *,
+        view: UploadedImage | None = None,
+        soft_only: bool = False,
+        path_guide: PathGuide | None = None,
+        min_coverage: float = MIN_COVERAGE,
+        depth_weights: DepthWeights = UNWEIGHTED,
+    ) -> IrradianceCache:
+        """A cache of some images with their weights."""
         own = tuple(opaque(float(weight)) for weight in weights)
-        return IrradianceCache(images=tuple(images), weights=own, **others)
+        return IrradianceCache(
+            view, tuple(images), own, hash_grid, soft_only, path_guide, min_coverage, depth_weights
+        )
 
     def lookup_in_view(self, position: Any, normal: Any, shape_index: Any) -> tuple[Any, Any]:
         """The same as :meth:`lookup`, from the image in the view of the camera."""

@@ -214,7 +214,7 @@ class ShotContext:
         filled_up = self._filled_up(images, own, self.settings.lookup_keyframes + DISOCCLUSION_IMAGES)
         return IrradianceCache.of(
             *filled_up,
-            hash_grid=self.hash_grid(frame),
+            self.hash_grid(frame),
             view=reprojected,
             soft_only=self.renderer.has_sharp_light(),
             path_guide=self._path_guide(*nearest(self.walk.path, self.keyframes, frame, 1)),

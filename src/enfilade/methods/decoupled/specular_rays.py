@@ -96,6 +96,7 @@ def shade_specular(
     tint = find_tint(shot, frame, where, is_centre, is_narrow, spp)
     if tint:
         traced[0] = tint.divided(traced[0])
+        release_memory()
     used = 1 + max((k for k, aov in enumerate(traced) if aov.color.any()), default=0)
     is_denoised = shot.settings.denoiser != "none"
     aovs = filter_spatially(

@@ -29,9 +29,9 @@ class Tint:
     Attributes
     ----------
     sampled : (H, W, 3) float32
-        By the camera rays that specular rays continue.
+        By the camera rays that specular rays continue; of narrow surfaces, which may have more, as `whole`.
     whole : (H, W, 3) float32
-        By more of them.
+        By :data:`TINT_RAYS`, which are not counted.
     """
 
     sampled: F32
@@ -95,6 +95,6 @@ def find_tint(
     if not is_textured.any():
         return None
     sampled = mean()
-    estimate.add(max(TINT_RAYS - spp, 0), is_textured)
+    estimate.add(max(TINT_RAYS - spp, 0), is_textured & ~centred[where])
     whole = mean()
     return Tint(np.where(narrow[..., None], whole, sampled), whole)

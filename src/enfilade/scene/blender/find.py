@@ -96,7 +96,8 @@ def find_blender(program: str = "") -> Blender:
         There is none, or the given one does not work.
     """
     if program:
-        found = _asked(_in_folder(Path(shutil.which(program) or program)))
+        place = Path(program)
+        found = _asked(_in_folder(place if place.exists() else Path(shutil.which(program) or place)))
         if isinstance(found, str):
             raise SceneError(f"{program} can't import scenes: {found}; {INSTALL}")
         return found

@@ -67,15 +67,16 @@ def is_textured(bsdf: Any, name: str) -> bool:
 
 
 def is_textured_metal(bsdf: Any) -> bool:
-    """Whether a texture colours the reflection of a metal."""
+    """Whether a texture colours the reflection of a metal, without a coat, on both sides."""
     match bsdf.class_name():
         case "Principled":
-            parameters = ("base_color", "metallic")
-            return constant(bsdf, "metallic") != 0.0 and any(is_textured(bsdf, name) for name in parameters)
+            is_bare = all(constant(bsdf, name) == 0.0 for name in ("clearcoat", "spec_trans"))
+            is_coloured = any(is_textured(bsdf, name) for name in ("base_color", "metallic"))
+            return is_bare and is_coloured and constant(bsdf, "metallic") != 0.0
         case "SmoothConductor" | "RoughConductor":
             return is_textured(bsdf, "specular_reflectance")
         case "TwoSidedBRDF" | "MaskBSDF" | "BumpMap" | "NormalMap":
-            return any(map(is_textured_metal, nested(bsdf)))
+            return all(map(is_textured_metal, nested(bsdf)))
     return False
 
 

@@ -34,7 +34,7 @@ from enfilade.scene.mitsuba.bsdfs import (
     mixes_delta_lobes,
     rough_ior,
 )
-from enfilade.scene.mitsuba.shapes import bsdf_table, has_lobe, registry_index
+from enfilade.scene.mitsuba.shapes import bsdf_table, bsdfs_of_shapes, has_lobe, registry_index
 
 WHOLE = {"Principled", "PrincipledThin", "MaskBSDF", "Hair", "Measured", "PolarizedPlastic"}  # not split
 # Attributes times these: shares of the base colour that the diffuse lobe does not reflect.
@@ -86,7 +86,7 @@ class Lobes:
         self._narrow = bsdf_table(scene, is_narrow)
         self._coated = bsdf_table(scene, lambda bsdf: classes(bsdf) <= COATED)
         self._textured_metal = bsdf_table(scene, is_textured_metal)
-        self.has_textured_metal = bool(dr.any(self._textured_metal))
+        self.has_textured_metal = any(map(is_textured_metal, bsdfs_of_shapes(scene)))
         self.has_coats = bool(dr.any(self._coated))
         self._has_whole = bool(dr.any(self._whole))
         self._mixed = bsdf_table(scene, mixes_delta_lobes)
@@ -184,7 +184,7 @@ class Lobes:
         return dr.select(is_whole, difference, value), dr.select(is_whole, mixture_pdf, pdf)
 
     def specular_tint(self, si: Any, bsdf: Any, active: Any) -> tuple[Any, Any]:
-        """Rough reflectance of the specular lobes, Color3f, and whether textures of a metal colour it.
+        """Approximate reflectance of the specular lobes, Color3f, and whether textures of a metal colour it.
 
         It does not depend on the slopes of a map. Other surfaces than such metals have a mean of their BSDF,
         and those that are not active 0.
@@ -201,6 +201,9 @@ class Lobes:
         principled = dr.lerp(dr.lerp(DIELECTRIC_TINT, color, metallic), 1.0, grazing)
         metal = dr.select(is_principled, principled, conductor)
         plain = dr.gather(Float, self.specular_albedos, _albedo_entry(_number(bsdf), Float(1)), active)
+        if self._has_masked:  # what is seen through a cut-out has not its colour
+            is_masked = is_textured & _of(self._masked, si, bsdf)
+            metal = dr.lerp(1.0, metal, dr.select(is_masked, _opacity(si, bsdf, is_masked), 1.0))
         tint = dr.maximum(dr.select(is_textured, metal, mi.Color3f(dr.minimum(plain, 1.0))), MIN_TINT)
         return dr.select(active, tint, 0.0), is_textured
 

@@ -121,6 +121,13 @@ def bsdf_table(scene: Any, value: Callable[[Any], Any], kind: Any = Bool) -> Any
     return lanes(table)
 
 
+def bsdfs_of_shapes(scene: Any) -> list[Any]:
+    """BSDFs of a scene that are not nested in others."""
+    hierarchy = mi.traverse(scene).hierarchy.items()
+    bsdfs = [(node, parent) for node, (parent, _) in hierarchy if isinstance(node, mi.BSDF)]
+    return [node for node, parent in bsdfs if not isinstance(parent, mi.BSDF)]
+
+
 def surface_class(flags: Any, is_narrow: Any, is_emitter: Any, is_hit: Any) -> Any:
     """``records.SurfaceClass`` of a BSDF with these flags, whose lobes may all show images; UInt."""
     refracts = has_lobe(flags, "DeltaTransmission", "GlossyTransmission")
