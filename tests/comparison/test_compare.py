@@ -151,7 +151,7 @@ def test_maps_are_shown_as_they_come(sequence):
 
     compare(folder, other, terms(flow="none"), Notes(), show=show)
     first, second = kept
-    assert (first.index, second.index) == (0, 1)
+    assert (first.difference.number, second.difference.number) == (1, 2)
     assert first.jnd.shape == first.grey.shape == SIZE
     assert first.jnd.max() > 1.0
     assert second.difference.steady.score == 0.0
