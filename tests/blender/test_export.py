@@ -124,7 +124,7 @@ def exported(blender, files):
 
     @cache
     def export(name):
-        code, out, result = blender.job(files[name], f"scene {name}")
+        code, out, result = blender.job(files[name], f"scene {{x}} {name}")
         assert code == 0, result
         return out, result
 
