@@ -71,8 +71,9 @@ def export(job: Job) -> dict[str, Any]:
     note_depths(views, selection, notes, casts=casts)
     note_falloff(lamps, selection, notes, casts=casts)
     made = [element for lamp in lamps for element in emitters(lamp, shapes.identifiers, notes)]
-    elements += [named(plugin("bsdf", "null"), LAMP), *made]
-    is_volumetric = bool(shapes.kinds & {"mask", "thindielectric"}) or needs_passing(made, sun)
+    elements = [named(plugin("bsdf", "null"), LAMP), *elements, *made]
+    is_volumetric = bool(shapes.kinds & {"mask", "thindielectric"}) or shapes.has_unseen_lamps
+    is_volumetric = is_volumetric or needs_passing(made, sun)
     elements += environment(selection, sun, job.out, notes)
     if not any(True for element in elements for _ in element.iter("emitter")):
         effect = "every frame would be black: add a lamp, or a world with light"

@@ -105,6 +105,8 @@ class Placed:
         Pass index of the object.
     names : tuple of str
         Of the copies; empty: all have the object's.
+    is_seen : bool
+        Whether Blender's camera sees it.
     """
 
     name: str
@@ -114,6 +116,7 @@ class Placed:
     colour: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0)
     index: int = 0
     names: tuple[str, ...] = ()
+    is_seen: bool = True
 
 
 @dataclass(eq=False)

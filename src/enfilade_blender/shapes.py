@@ -32,7 +32,7 @@ from enfilade_blender.materials.values import (
 from enfilade_blender.notes import Notes, report_progress
 from enfilade_blender.ply import Mesh, joined, write_ply
 from enfilade_blender.records import Placed, Selection, View
-from enfilade_blender.scene_xml import Element, Identifiers, named, plugin, reference
+from enfilade_blender.scene_xml import LAMP, Element, Identifiers, named, plugin, reference
 
 DEFAULT = Lobe("diffuse", Constant((0.8, 0.8, 0.8)), "no material")
 FLAT_TRIANGLES = 8_000_000  # a scene of more has instances
@@ -83,6 +83,8 @@ class Shapes:
         Of BSDFs, shapes and emitters.
     kinds : set of str
         Plugins of the BSDFs of visible surfaces, nested ones included.
+    has_unseen_lamps : bool
+        Whether there are emitters that the camera does not see.
     """
 
     def __init__(self, job: Job, selection: Selection, views: list[View], notes: Notes) -> None:
@@ -99,6 +101,7 @@ class Shapes:
         self._bsdfs: list[Element] = []
         self._baked: list[str] = []  # ids of the BSDFs of one object
         self.kinds: set[str] = set()
+        self.has_unseen_lamps = False
         (job.out / "meshes").mkdir(exist_ok=True)
 
     @property
@@ -131,7 +134,7 @@ class Shapes:
         """
         groups: dict[Any, list[Placed]] = {}
         for item in placed:
-            key = id(item.mesh), item.slots, item.colour, item.index
+            key = id(item.mesh), item.slots, item.colour, item.index, item.is_seen
             groups.setdefault(key, []).append(item)
         result = []
         for items in groups.values():
@@ -172,6 +175,9 @@ class Shapes:
                 # Highlights are stretched along the UV map.
                 material = replace(material, uv=mesh.active_uv or None)
             radiance = surface.radiance(self._context(part.material))
+            is_lamp = not placed.is_seen and surface.bsdf is None and radiance is not None
+            if not placed.is_seen:
+                self._note_unseen(placed, is_lamp=is_lamp)
             mesh = _with_maps(mesh, material.uv, material.attribute)
             if is_instanced and radiance is None:
                 instanced += self._shapes_of(f"{name} mesh", mesh, material, None)
@@ -181,12 +187,22 @@ class Shapes:
                 what, effect = "the emission of a surface without area is left out", "it gives no light"
                 self._notes.add("not-carried", name, "Emission", what, effect)
                 radiance = None
-            elements += self._shapes_of(name, mesh, material, radiance)
+            shapes = self._shapes_of(name, mesh, material, radiance)
             if radiance is not None and not (
                 is_one(surface.opacity) and self._hides_its_back(part.mesh, placed)
             ):
-                elements += self._shapes_of(f"{name} back", _back(mesh), material, radiance)
+                shapes += self._shapes_of(f"{name} back", _back(mesh), material, radiance)
+            elements += [_as_lamp(shape) for shape in shapes] if is_lamp else shapes
         return elements + (self._instances(placed, instanced) if instanced else [])
+
+    def _note_unseen(self, placed: Placed, *, is_lamp: bool) -> None:
+        if is_lamp:
+            self.has_unseen_lamps = True
+            what, effect = "a lamp that the camera does not see", "it casts no shadows"
+            self._notes.add("approximated", placed.name, "Ray visibility", what, effect)
+            return
+        what, effect = "hidden from camera rays in Blender", "it is visible, and may hide what is behind"
+        self._notes.add("not-carried", placed.name, "Ray visibility", what, effect)
 
     def _resolved(self, part: _Part) -> tuple[_Material, Mesh]:
         """A part's shader without procedural values, and its mesh; linked duplicates share what is baked."""
@@ -304,6 +320,14 @@ class Shapes:
     def _context(self, material: Any, *, is_mirrored: bool = False) -> Context:
         owner = material.name if material else "no material"
         return Context(owner, self.textures, self._notes, is_mirrored)
+
+
+def _as_lamp(shape: Element) -> Element:
+    """An emitter that the camera does not see, as lamps are."""
+    of = shape.find("ref")
+    assert of is not None  # noqa: S101  (`Shapes._shape`)
+    of.set("id", LAMP)
+    return shape
 
 
 def _is_solid(part: _Part) -> bool:

@@ -156,6 +156,21 @@ def test_opacity_dims_what_is_emitted(made):
     assert radiance.split() == ["1", "1", "1"]
 
 
+def test_coordinates_times_constants_are_not_baked(made):
+    _, elements, notes = made
+    (texture,) = elements["material scaled"].iter("texture")
+    matrix = np.array(texture.find("transform/matrix").get("value").split(), float)
+    assert matrix[[0, 5]] == pytest.approx([3.0, -3.0], abs=1e-5)
+    assert "scaled" not in notes
+
+
+def test_metal_has_no_transmission(made):
+    bsdf = made[1]["material plated"]
+    (metal,) = [nested for nested in bsdf.iter("bsdf") if nested.find("bsdf") is None]
+    assert metal.get("type") == "roughconductor"
+    assert float(metal.find("float[@name='alpha']").get("value")) == pytest.approx(0.05**2)
+
+
 def test_a_mix_with_transparent_by_the_kind_of_ray_is_its_other_side(blender):
     code, out, result = blender.job(blender.make("kinds_of_rays")[0], "kinds of rays")
     assert code == 0, result
@@ -199,7 +214,8 @@ def test_clear_glass_that_shadow_rays_pass_is_thin_but_on_solid_objects(blender)
 
 
 @pytest.mark.parametrize(
-    "name", ["leaves", "lamps_in_the_way", "tilted", "painted_lamps", "single_scattering", "panes"]
+    "name",
+    ["leaves", "lamps_in_the_way", "tilted", "painted_lamps", "single_scattering", "panes", "masked_light"],
 )
 def test_light_is_that_of_cycles(blender, name):
     (source,) = blender.make(name)

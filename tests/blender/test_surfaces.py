@@ -1,6 +1,7 @@
 """Surfaces of shaders, without Blender."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 from xml.etree import ElementTree as ET
 
 import drjit as dr
@@ -8,11 +9,20 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from enfilade_blender.materials.bsdfs import Context
+from enfilade_blender.materials.bsdfs import Context, with_normal
 from enfilade_blender.materials.surfaces import build
 from enfilade_blender.materials.textures import Textures
-from enfilade_blender.materials.values import Constant, Lobe, Mix, Principled
+from enfilade_blender.materials.values import (
+    Constant,
+    Lobe,
+    Mix,
+    NormalMap,
+    Output,
+    Principled,
+    Texture,
+)
 from enfilade_blender.notes import Notes
+from enfilade_blender.scene_xml import plugin
 
 SAMPLES = 100_000
 WHITE = Constant((1.0, 1.0, 1.0))
@@ -115,3 +125,25 @@ def test_coats_keep_their_energy(context, base):
 def test_a_mix_with_a_mirror_keeps_its_energy(context):
     mix = Mix(Constant((0.5,)), Lobe("diffuse", GREY, "paint"), Lobe("glossy", WHITE, "mirror"), None, "mix")
     assert albedo(mix, context) == pytest.approx(0.75, rel=0.01)
+
+
+@pytest.mark.parametrize(("convention", "green"), [("OPENGL", None), ("DIRECTX", 0.2)])
+def test_normal_maps_of_directx_have_green_downwards(context, monkeypatch, convention, green):
+    written = []
+
+    def write(_self, _name, image, **_options):
+        written.append(image)
+        return "textures/flipped.png"
+
+    monkeypatch.setattr(Textures, "pixels", lambda *_: np.full((2, 2, 3), (0.5, 0.8, 0.9), np.float32))
+    monkeypatch.setattr(Textures, "write", write)
+    node = SimpleNamespace(type="NORMAL_MAP", convention=convention)
+    texture = Texture("textures/tilted.png", "UVMap", (0.5, 0.8, 0.9), raw=True)
+    bsdf = with_normal(
+        plugin("bsdf", "diffuse"), NormalMap(texture, 1.0, Output(SimpleNamespace(node=node))), context
+    )
+    name = bsdf.find("texture/string[@name='filename']").get("value")
+    assert name == ("textures/tilted.png" if green is None else "textures/flipped.png")
+    assert [float(image[..., 1].mean()) for image in written] == pytest.approx(
+        [] if green is None else [green]
+    )

@@ -195,7 +195,12 @@ OBJECTS = (
         "missing",
     ),
     (
-        "Ray visibility of meshes, shadow catcher, holdout, indirect only",
+        "Meshes that only emit, and that the camera does not see",
+        "approximated",
+        "not seen by the camera; they cast no shadows",
+    ),
+    (
+        "Other ray visibility of meshes, shadow catcher, holdout, indirect only",
         "not carried",
         "visible to all rays",
     ),

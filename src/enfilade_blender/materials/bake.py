@@ -90,12 +90,12 @@ class Bakery:
             return shader, mesh, False
         if len(uv_maps) <= 1 and all(isinstance(v, Procedural) and v.uv_map is not None for v in wanted):
             return replaced(shader, lambda value: self._over_uv(value, material)), mesh, False
-        size = self._resolution(copies, mesh)
+        wanted = self._resolution(copies, mesh)
         shader = self._with_baked_normals(shader)
         mesh = _with_room(mesh, shader)
         with self._stage().mesh(mesh, placed) as canvas:
             mesh = replace(mesh, uvs={**mesh.uvs, BAKED_UV: canvas.unwrap()}, active_uv=BAKED_UV)
-            own = replaced(shader, lambda value: self._over_mesh(value, material, canvas, placed, size))
+            own = replaced(shader, lambda value: self._over_mesh(value, material, canvas, placed, wanted))
         return own, mesh, True
 
     def _stage(self) -> BakeScene:
@@ -110,33 +110,33 @@ class Bakery:
         key = value.output.socket.as_pointer(), groups, value.is_number, value.is_exact
         if key not in self._of_uv:
             sizes = [max(image.size) for image in _images(value.output)]
-            size = int(min(max([CONSTANT_PX, *sizes]), self._job.bake_px))
+            wanted = max([CONSTANT_PX, *sizes])
             with self._stage().square(value.uv_map, value.matrix) as canvas:
-                pixels, _ = canvas.bake(value.output, material, size, _kind(value))
-            stored = self._stored(pixels, None, value, material.name, value.uv_map)
+                pixels, _ = canvas.bake(value.output, material, self._limited(wanted), _kind(value))
+            stored = self._stored(pixels, None, value, material.name, value.uv_map, wanted)
             if isinstance(stored, Texture):
                 stored = replace(stored, matrix=value.matrix)
             self._of_uv[key] = stored
         return self._of_uv[key]
 
-    def _over_mesh(self, value: Any, material: Any, canvas: Any, placed: Placed, size: int) -> Any:
+    def _over_mesh(self, value: Any, material: Any, canvas: Any, placed: Placed, wanted: int) -> Any:
         if isinstance(value, Constant | AttributeValue | Texture):
             return value
         is_lost = isinstance(value, ImageValue) and self._textures.is_missing(value)
         if is_lost or (isinstance(value, Procedural) and _is_missing(value.output.node)):
             return Constant((0.5, 0.5, 0.5))
-        pixels, covered = canvas.bake(value.output, material, size, _kind(value))
+        pixels, covered = canvas.bake(value.output, material, self._limited(wanted), _kind(value))
         if isinstance(value, ProceduralNormal):
             pixels = np.where(covered[..., None], np.clip(pixels, 0.0, 1.0), FLAT)
             file = self._textures.write(
                 f"{placed.name} normal", pixels.astype(np.float32), raw=True, is_exact=True
             )
             name = f"{material.name}, {placed.name}"
-            self._note(value.output, name, size)
+            self._note(value.output, name, wanted)
             if is_of_view(value.output):
                 self._note_view(value.output, name)
             return NormalMap(Texture(file, BAKED_UV, FLAT, raw=True), 1.0, value.output)
-        return self._stored(pixels, covered, value, f"{material.name}, {placed.name}", BAKED_UV)
+        return self._stored(pixels, covered, value, f"{material.name}, {placed.name}", BAKED_UV, wanted)
 
     def _with_baked_normals(self, shader: Shader) -> Shader:
         """The shader whose normal maps are to be baked: an image's tangents are those of its own UV map.
@@ -169,7 +169,7 @@ class Bakery:
                     self._notes.add("approximated", material.name, found.node.name, what, OBJECT_EFFECT)
 
     def _stored(
-        self, pixels: F32, covered: Any, value: Procedural | ImageValue, name: str, uv_map: str
+        self, pixels: F32, covered: Any, value: Procedural | ImageValue, name: str, uv_map: str, wanted: int
     ) -> Value:
         """A baked value: a constant where it is uniform, else a file; texels off the mesh are its mean."""
         output = value.output
@@ -186,19 +186,25 @@ class Bakery:
         is_data = output.socket.type != "RGBA" or bool(pixels.max() > 1.0)
         pixels = pixels if is_exact else np.maximum(pixels, 0.0)
         file = self._textures.write(f"{name} {output.node.name}", pixels, raw=is_data, is_exact=is_exact)
-        self._note(output, name, len(pixels))
+        self._note(output, name, wanted)
         return Texture(file, uv_map, colour, raw=is_data or file.endswith(".exr"))
 
-    def _note(self, output: Output, name: str, size: int) -> None:
-        node, what = f"{output.node.name}: {output.socket.name}", f"baked to {size}x{size} pixels"
-        self._notes.add("baked", name, node, what, "detail is limited to its pixels")
+    def _limited(self, wanted: int) -> int:
+        return min(wanted, self._job.bake_px)
+
+    def _note(self, output: Output, name: str, wanted: int) -> None:
+        node, size = f"{output.node.name}: {output.socket.name}", self._limited(wanted)
+        what, effect = f"baked to {size}x{size} pixels", "detail is limited to its pixels"
+        if size < wanted:
+            effect = f"it is blurred: {wanted} are needed, and blender.bake_px is {size}"
+        self._notes.add("baked", name, node, what, effect)
 
     def _note_view(self, output: Output, name: str) -> None:
         effect = "the surface looks the same from all directions"
         self._notes.add("approximated", name, output.node.name, "it depends on the view", effect)
 
     def _resolution(self, copies: list[np.ndarray], mesh: Mesh) -> int:
-        """A power of two, by the largest size of a mesh's copies in the views of the path."""
+        """Side of a baked texture, a power of two, by the largest size of a mesh's copies in the views."""
         bounds = np.stack([mesh.positions.min(axis=0), mesh.positions.max(axis=0)])
         matrices = np.array(copies[:: max(len(copies) // SEEN_COPIES, 1)])
         ends = bounds @ matrices[:, :3, :3].transpose(0, 2, 1) + matrices[:, None, :3, 3]
@@ -210,8 +216,7 @@ class Bakery:
             focal = 0.5 * view.projection[1, 1] * self._selection.size[1]
             nearest = max(nearest, float((2.0 * radii / distances * focal).max()))
         wanted = nearest * PER_PIXEL if self._views else float(self._job.bake_px)
-        power = 2 ** int(np.ceil(np.log2(max(wanted, SMALLEST))))
-        return int(min(power, self._job.bake_px))
+        return int(2 ** int(np.ceil(np.log2(max(wanted, SMALLEST)))))
 
 
 def _kind(value: Any) -> BakeKind:

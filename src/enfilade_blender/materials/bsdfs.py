@@ -26,8 +26,7 @@ from enfilade_blender.materials.values import (
 from enfilade_blender.notes import Notes
 from enfilade_blender.scene_xml import Element, Property, colour, plugin
 
-SMOOTH = 1e-3  # alpha below which a surface is a mirror
-ALPHA_MIN = 0.01
+SMOOTH = 1e-3  # alpha below which a surface is a mirror; the least of textures
 EVEN = 0.01  # difference of gains below which they are one number
 ALPHAS = np.linspace(0.0, 1.0, 17)  # at which gains of textured roughness are computed
 ROUGHEST_PLASTIC = 0.55  # rougher interfaces darken at grazing angles in Mitsuba, not in Blender
@@ -112,7 +111,6 @@ def _plastic_of(base: Value, roughness: float, ior: float, context: Context) -> 
     if alpha < SMOOTH:
         reflectance = context.textures.colour(base)
         return plugin("bsdf", "plastic", int_ior=ior, ext_ior=1.0, diffuse_reflectance=reflectance)
-    alpha = max(alpha, ALPHA_MIN)
     reflectance = context.textures.scaled(base, ggx.plastic_gain(round(alpha, 3), round(ior, 3)))
     return plugin(
         "bsdf", "roughplastic", distribution="ggx", alpha=alpha, int_ior=ior, ext_ior=1.0,
@@ -173,7 +171,8 @@ def glass_bsdf(
         tint: Property
         if isinstance(value, Constant):
             gain = partial(_glass_gain, ior, number, is_multiple=is_multiple)
-            tint = _gained(value.colour, gain, alpha, roughness, f"{name} {ior:.3g}", context)
+            kind = f"{name} {ior:.3g}{' multiple' * is_multiple}"
+            tint = _gained(value.colour, gain, alpha, roughness, kind, context)
         else:
             tint = value if isinstance(value, Element) else context.textures.colour(value)
         if tint != WHITE:
@@ -205,7 +204,7 @@ def conductor_bsdf(
         def gain(alpha: float) -> np.ndarray:
             return np.array([ggx.metal_scale(float(c), alpha) if is_multiple else 1.0 for c in r])
 
-        name = "metal" + "".join(f" {c:.3g}" for c in r)
+        name = "metal" + "".join(f" {c:.3g}" for c in r) + " multiple" * is_multiple
         optics["specular_reflectance"] = _gained(_unbounded(tint), gain, alpha, roughness, name, context)
     else:
         optics["specular_reflectance"] = context.textures.colour(reflectance)
@@ -224,11 +223,10 @@ def _microfacets(
 def _alpha(roughness: Value, context: Context) -> float | Element:
     """GGX alpha: the roughness squared, also of a texture."""
     if isinstance(roughness, Constant):
-        alpha = clipped(roughness.number) ** 2
-        return alpha if alpha < SMOOTH else max(alpha, ALPHA_MIN)
+        return clipped(roughness.number) ** 2
     if context.textures.has_pixels(roughness):
         inside = np.clip(context.textures.numbers(roughness), 0.0, 1.0)
-        return context.textures.rewritten(roughness, np.maximum(inside**2, ALPHA_MIN), "alpha")
+        return context.textures.rewritten(roughness, np.maximum(inside**2, SMOOTH), "alpha")
     return 0.25
 
 
@@ -317,15 +315,16 @@ def _is_void(value: Value, context: Context) -> bool:
 
 def _normal_texture(normal: NormalMap, context: Context) -> Element:
     value, is_turned = normal.image, context.is_back and normal.output.node.type == "NORMAL_MAP"
-    is_as_is = abs(normal.strength - 1.0) < 1e-3 and not context.is_mirrored and not is_turned
+    is_flipped = context.is_mirrored != (getattr(normal.output.node, "convention", "OPENGL") == "DIRECTX")
+    is_as_is = abs(normal.strength - 1.0) < 1e-3 and not is_flipped and not is_turned
     if is_as_is or not isinstance(value, ImageValue | Texture):
         return context.textures.colour(value)
     n = context.textures.pixels(value) * 2.0 - 1.0
-    n = n * np.array([1.0, -1.0 if context.is_mirrored else 1.0, 1.0])
+    n = n * np.array([1.0, -1.0 if is_flipped else 1.0, 1.0])
     n = n * (np.array([-1.0, -1.0, 1.0]) if is_turned else 1.0)  # Cycles negates all of it on a back
     n = np.concatenate([n[..., :2] * normal.strength, 1.0 + (n[..., 2:] - 1.0) * normal.strength], axis=-1)
     n /= np.maximum(np.linalg.norm(n, axis=-1, keepdims=True), 1e-6)
-    name = f"normal {normal.strength:.3g}{' mirrored' * context.is_mirrored}{' back' * is_turned}"
+    name = f"normal {normal.strength:.3g}{' flipped' * is_flipped}{' back' * is_turned}"
     return context.textures.rewritten(value, 0.5 * n + 0.5, name)
 
 

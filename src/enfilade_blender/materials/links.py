@@ -77,19 +77,32 @@ def uv_coordinates(socket: Any, groups: tuple[Any, ...]) -> tuple[str, Matrix3] 
         return node.uv_map, IDENTITY
     if node.type == "TEX_COORD" and found.socket.name == "UV" and not node.from_instancer:
         return "", IDENTITY
-    is_affine = node.type == "MAPPING" and node.vector_type != "NORMAL"
-    if is_affine and not any(node.inputs[i].is_linked for i in (1, 2, 3)):
-        inner = uv_coordinates(node.inputs["Vector"], found.groups)
-        if inner is None or not node.inputs["Vector"].is_linked:
+    if node.type != "MAPPING" or node.vector_type == "NORMAL" or not node.inputs["Vector"].is_linked:
+        return None
+    inner = uv_coordinates(node.inputs["Vector"], found.groups)
+    location, rotation, scale = (_constant_vector(node.inputs[i], found.groups) for i in (1, 2, 3))
+    if node.vector_type == "VECTOR":
+        location = (0.0, 0.0, 0.0)
+    if inner is None or location is None or rotation is None or scale is None:
+        return None
+    own = mapping.uv_matrix(node.vector_type, location, rotation, scale)
+    return inner[0], mapping.product(own, inner[1])
+
+
+def _constant_vector(socket: Any, groups: tuple[Any, ...]) -> tuple[float, float, float] | None:
+    """A finite vector that is the same everywhere, of numbers, vectors and colours; None of any other."""
+    found = follow(socket, groups)
+    if isinstance(found, Output):
+        if found.node.type == "COMBXYZ":
+            parts = [_constant_vector(part, found.groups) for part in found.node.inputs]
+            x, y, z = (None if part is None else part[0] for part in parts)
+            return None if x is None or y is None or z is None else (x, y, z)
+        if found.node.type not in ("RGB", "VALUE"):
             return None
-        location, rotation, scale = (tuple(node.inputs[i].default_value) for i in (1, 2, 3))
-        if node.vector_type == "VECTOR":
-            location = (0.0, 0.0, 0.0)
-        if not all(map(math.isfinite, (*location, *rotation, *scale))):
-            return None
-        own = mapping.uv_matrix(node.vector_type, location, rotation, scale)
-        return inner[0], mapping.product(own, inner[1])
-    return None
+        found = found.socket
+    value = found.default_value
+    numbers = (value,) * 3 if isinstance(value, int | float) else tuple(value)[:3]
+    return numbers if len(numbers) == 3 and all(map(math.isfinite, numbers)) else None
 
 
 def upstream(output: Output, *, below_images: bool = True) -> Iterator[Output]:

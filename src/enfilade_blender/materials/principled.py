@@ -6,7 +6,7 @@ from __future__ import annotations
 from enfilade_blender.materials import mapping
 from enfilade_blender.materials.bsdfs import (
     ALMOST,
-    ALPHA_MIN,
+    SMOOTH,
     WHITE,
     Context,
     blend,
@@ -32,10 +32,10 @@ def principled_bsdf(shader: Principled, context: Context) -> Element:
         ior = mapping.interface_ior(shader.number("IOR"), shader.number("Specular IOR Level"))
         return plastic_bsdf(shader["Base Color"], shader["Roughness"], ior, context)
 
-    def opaque() -> Element:
-        return blend(shader["Metallic"], plastic, lambda: _metal(shader, context), context)
+    def dielectric() -> Element:
+        return blend(shader["Transmission Weight"], plastic, lambda: _glass(shader, context), context)
 
-    whole = blend(shader["Transmission Weight"], opaque, lambda: _glass(shader, context), context)
+    whole = blend(shader["Metallic"], dielectric, lambda: _metal(shader, context), context)
     whole = with_normal(whole, shader.normal, context)  # which a coat has not
     coat_ior, coat_roughness = shader.number("Coat IOR"), shader["Coat Roughness"]
     whole = layered(whole, shader["Coat Weight"], coat_ior, coat_roughness, WHITE, context)
@@ -60,7 +60,7 @@ def _metal(shader: Principled, context: Context) -> Element:
     extra: dict[str, Property] = {}
     if anisotropy > 0.0 and isinstance(roughness, Constant):
         aspect = (1.0 - 0.9 * anisotropy) ** 0.5
-        alpha = max(clipped(roughness.number) ** 2, ALPHA_MIN)
+        alpha = max(clipped(roughness.number) ** 2, SMOOTH)
         extra = {"alpha_u": alpha / aspect, "alpha_v": alpha * aspect}
     return conductor_bsdf(
         shader["Base Color"], roughness, extra, context, edge=edge, is_multiple=shader.is_multiple

@@ -3,8 +3,12 @@
 
 from __future__ import annotations
 
+import zlib
 from dataclasses import dataclass, replace
+from typing import Any
 from xml.etree import ElementTree as ET
+
+import numpy as np
 
 from enfilade_blender.materials import mapping
 from enfilade_blender.materials.bsdfs import (
@@ -24,11 +28,13 @@ from enfilade_blender.materials.values import (
     Add,
     Constant,
     Emission,
+    ImageValue,
     Lobe,
     Mix,
     Nothing,
     Principled,
     Shader,
+    Texture,
     Value,
 )
 from enfilade_blender.scene_xml import Element, plugin
@@ -40,10 +46,34 @@ SHARP = 0.03  # roughness of a pane below which its reflections are sharp
 
 @dataclass(frozen=True, eq=False)
 class Radiance:
-    """Emitted radiance: a colour or texture times a number."""
+    """Emitted radiance: a colour times numbers.
+
+    Attributes
+    ----------
+    colour : Value
+    strength : float
+    factors : tuple of (Value, bool)
+        Textured strengths, opacities, and factors of mixes; 1 minus the value where the second is true.
+    """
 
     colour: Value
     strength: float
+    factors: tuple[tuple[Value, bool], ...] = ()
+
+    def scaled(self, factor: Value, *, is_inverted: bool) -> Radiance:
+        """The radiance times a number, or times 1 minus it."""
+        if isinstance(factor, Constant):
+            number = 1.0 - factor.number if is_inverted else factor.number
+            return replace(self, strength=self.strength * number)
+        return replace(self, factors=(*self.factors, (factor, is_inverted)))
+
+    def mean(self, context: Context) -> np.ndarray:
+        """Product of the means, (3,)."""
+        mean = self.strength * np.array(context.textures.mean(self.colour))
+        for factor, is_inverted in self.factors:
+            number = Constant(context.textures.mean(factor)).number
+            mean = mean * (1.0 - number if is_inverted else number)
+        return mean
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,16 +121,47 @@ class Surface:
         if not self.emitted:
             return None
         (radiance,) = self.emitted
-        if isinstance(radiance.colour, Constant):
-            r, g, b = (max(c * radiance.strength, 0.0) for c in radiance.colour.colour)
+        values = [radiance.colour, *(value for value, _ in radiance.factors)]
+        images = [value for value in values if context.textures.has_pixels(value)]
+        if not images:
+            r, g, b = (max(float(c), 0.0) for c in radiance.mean(context))
             return (r, g, b) if max(r, g, b) > 0.0 else None
-        if not context.textures.has_pixels(radiance.colour):
-            return (0.5 * radiance.strength,) * 3
-        if abs(radiance.strength - 1.0) < 1e-3:
+        if images == values == [radiance.colour] and abs(radiance.strength - 1.0) < 1e-3:
             return context.textures.colour(radiance.colour)
-        scaled = context.textures.pixels(radiance.colour) * radiance.strength
-        name = f"emission {radiance.strength:.3g}"
-        return context.textures.rewritten(radiance.colour, scaled, name, raw=False)
+        return _textured(radiance, images[0], context)
+
+
+def _textured(radiance: Radiance, place: ImageValue | Texture, context: Context) -> Element:
+    """A texture of emitted radiance, looked up as one of its images; others have to be mapped alike."""
+    textures, product = context.textures, np.full((1, 1, 3), radiance.strength, np.float32)
+    factors = [(value, is_inverted, False) for value, is_inverted in radiance.factors]
+    for value, is_inverted, is_colour in [(radiance.colour, False, True), *factors]:
+        if textures.has_pixels(value) and _placement(value) == _placement(place):
+            numbers = textures.pixels(value) if is_colour else textures.numbers(value)
+        else:
+            mean = textures.mean(value)
+            numbers = np.array(mean if is_colour else [Constant(mean).number], np.float32)[None, None]
+            if textures.has_pixels(value):
+                what, effect = "the mean of an image that is mapped differently", "its pattern is lost"
+                context.notes.add("approximated", context.owner, "Emission", what, effect)
+        product = _multiplied(product, 1.0 - numbers if is_inverted else numbers)
+    product = np.maximum(product, np.float32(0))
+    return textures.rewritten(place, product, f"emission {zlib.crc32(product.tobytes()):08x}", raw=False)
+
+
+def _placement(value: ImageValue | Texture) -> tuple[Any, ...]:
+    """How an image is looked up at texture coordinates."""
+    return value.matrix, value.node.extension if isinstance(value, ImageValue) else "REPEAT"
+
+
+def _multiplied(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Product of two images (H, W, 1 or 3), of the size of the larger one."""
+    height, width, _ = np.maximum(first.shape, second.shape)
+    first, second = (
+        image[np.arange(height) * len(image) // height][:, np.arange(width) * image.shape[1] // width]
+        for image in (first, second)
+    )
+    return first * second
 
 
 def _other(bsdf: Element, than: Element) -> Element | None:
@@ -227,24 +288,14 @@ def _cut_out(
     if not is_one(surface.opacity):
         what, effect = "two opacities; the outer one is kept", "the surface is less transparent"
         context.notes.add("approximated", context.owner, node, what, effect)
-    emitted = surface.emitted
-    if emitted and isinstance(factor, Constant):
-        share = 1.0 - factor.number if is_inverted else factor.number
-        emitted = tuple(replace(part, strength=part.strength * share) for part in emitted if share > 0.0)
-    elif emitted:
-        what, effect = "light is emitted where the surface is transparent, too", "the cut-out shines"
-        context.notes.add("approximated", context.owner, node, what, effect)
+    scaled = (part.scaled(factor, is_inverted=is_inverted) for part in surface.emitted)
+    emitted = tuple(part for part in scaled if part.strength > 0.0)
     return replace(surface, opacity=factor, opacity_is_inverted=is_inverted, emitted=emitted)
 
 
 def _blended(first: Surface, second: Surface, mix: Mix, context: Context) -> Surface:
-    factor = mix.factor if isinstance(mix.factor, Constant) else None
-    share = factor.number if factor else Constant(context.textures.mean(mix.factor)).number
-    emitted = [replace(part, strength=part.strength * (1.0 - share)) for part in first.emitted]
-    emitted += [replace(part, strength=part.strength * share) for part in second.emitted]
-    if emitted and factor is None:
-        what, effect = "emission by the mean of a textured factor", "light is even over the surface"
-        context.notes.add("approximated", context.owner, mix.name, what, effect)
+    emitted = [part.scaled(mix.factor, is_inverted=True) for part in first.emitted]
+    emitted += [part.scaled(mix.factor, is_inverted=False) for part in second.emitted]
     if first.bsdf is None and second.bsdf is None and first.opacity == second.opacity:
         return replace(first, emitted=_joined(emitted, mix, context))
     parts = _masked(first, context), _masked(second, context)
@@ -278,15 +329,12 @@ def _joined(emitted: list[Radiance], shader: Mix | Add, context: Context) -> tup
     lit = [part for part in emitted if part.strength > 0.0]
     if len(lit) <= 1:
         return tuple(lit)
-    if all(isinstance(part.colour, Constant) for part in lit):
-        total = [
-            sum(part.colour.colour[i] * part.strength for part in lit if isinstance(part.colour, Constant))
-            for i in range(3)
-        ]
-        return (Radiance(Constant(tuple(total)), 1.0),)
+    if all(isinstance(part.colour, Constant) and not part.factors for part in lit):
+        r, g, b = (float(c) for c in sum(part.mean(context) for part in lit))
+        return (Radiance(Constant((r, g, b)), 1.0),)
     what, effect = "of two emissions the stronger is kept", "the surface shines less"
     context.notes.add("approximated", context.owner, shader.name, what, effect)
-    return (max(lit, key=lambda part: part.strength * sum(context.textures.mean(part.colour))),)
+    return (max(lit, key=lambda part: float(part.mean(context).sum())),)
 
 
 def _radiance(colour: Value, strength: Value, context: Context) -> tuple[Radiance, ...]:
@@ -295,15 +343,7 @@ def _radiance(colour: Value, strength: Value, context: Context) -> tuple[Radianc
         context.notes.add("not-carried", context.owner, "Emission", what, effect)
     if is_zero_exactly(strength) or is_zero_exactly(colour):
         return ()
-    if isinstance(strength, Constant):
-        return (Radiance(colour, strength.number),)
-    if isinstance(colour, Constant) and max(colour.colour) - min(colour.colour) < 1e-6:
-        return (Radiance(strength, colour.number),)
-    effect = "the pattern of the emission's strength is lost"
-    context.notes.add(
-        "approximated", context.owner, "Emission", "a textured strength is taken as its mean", effect
-    )
-    return (Radiance(colour, Constant(context.textures.mean(strength)).number),)
+    return (Radiance(colour, 1.0).scaled(strength, is_inverted=False),)
 
 
 def _takes_light(colour: Value, strength: Value) -> bool:

@@ -34,7 +34,7 @@ def uncommon_materials(folder):
     new_file()
     half = image("half", _grey, 16, alpha=lambda x, _y: np.where(x < 0.5, 1.0, 0.5))
     (folder / "picture.png").write_bytes(half.packed_file.data)
-    kinds = _cut_out, _see_through, _sheer_gloss, _bumpy_plastic, _pixelated, _bright, _decal
+    kinds = _cut_out, _see_through, _sheer_gloss, _bumpy_plastic, _pixelated, _bright, _decal, _scaled
     materials = [make(half) for make in kinds]
     materials += [
         principled("premultiplied", half, Metallic=1.0),
@@ -42,6 +42,7 @@ def uncommon_materials(folder):
         principled("brushed", Metallic=1.0, Anisotropic=0.8, Anisotropic_Rotation=0.25),
         principled("brushed by image", Metallic=1.0, Anisotropic=half),
         principled("green mirror", Metallic=1.0, Roughness=image("green", _green, 16, space="Non-Color")),
+        principled("plated", (0.8, 0.6, 0.3, 1), Metallic=1.0, Transmission_Weight=1.0, Roughness=0.05),
         principled("faint glow", Emission_Color=(1, 1, 1, 1), Emission_Strength=4.0, Alpha=0.25),
         principled("varnished", Roughness=0.5, Coat_Weight=1.0, Coat_Roughness=0.1),
         principled("picture", bpy.data.images.load(str(folder / "picture.png"))),
@@ -634,6 +635,34 @@ def leaves(folder):
         plane(f"Leaf {number}", (0.0, 0.0, 0.3 + 0.2 * number), 3.0, leaf)
 
 
+def masked_light(_folder):
+    """Signs of which a fourth shines: by their opacity, a mix, a strength; and a lamp that no camera sees.
+
+    The camera looks down through the lamp.
+    """
+    scene = new_file()
+    scene.camera.location, scene.camera.rotation_euler = (0.0, 0.0, 12.0), (0.0, 0.0, 0.0)
+
+    def stripe(x, _y):
+        return np.where(x < 0.25, 1.0, 0.0)
+
+    mask = image("mask", lambda x, y: np.repeat(stripe(x, y)[..., None], 3, -1), 64, space="Non-Color")
+    sign = image("sign", tiles, 64, alpha=stripe)
+    cut, tree, bsdf = shader("cut", "BsdfPrincipled", Base_Color=(0, 0, 0, 1), Emission_Strength=2.0)
+    texture = picture(tree, sign)
+    fill(tree, bsdf, {"Emission Color": texture, "Alpha": texture.outputs["Alpha"]})
+    mixed, tree, mix = shader("mixed", "MixShader")
+    glow = node_of(tree, "Emission", Color=(1.0, 0.5, 0.2, 1.0), Strength=3.0)
+    fill(tree, mix, {0: mask, 1: node_of(tree, "BsdfDiffuse", Color=(0, 0, 0, 1)), 2: glow})
+    strip, tree, glow = shader("strip", "Emission", Color=(0.2, 0.5, 1.0, 1.0))
+    fill(tree, glow, {"Strength": mask})
+    for number, material in enumerate((cut, mixed, strip)):
+        plane(material.name, (2.0 * number - 3.0, 0.0, 0.0), 1.8, material)
+    plane("lit", (3.0, 0.0, 0.0), 1.8, shader("lit", "BsdfDiffuse", Color=(0.5, 0.5, 0.5, 1))[0])
+    panel = plane("Panel", (0.0, 0.0, 6.0), 4.0, shader("panel", "Emission", Strength=5.0)[0])
+    panel.visible_camera = False
+
+
 def lamps_in_the_way(folder):
     """A window's area light, and a card with holes, between a floor and a sun, a spot and a panel."""
     scene = new_file()
@@ -764,4 +793,17 @@ def _decal(half):
     texture.extension = "CLIP"
     fill(tree, texture, {"Vector": scaled})
     fill(tree, bsdf, {"Base Color": texture, "Alpha": texture.outputs["Alpha"]})
+    return material
+
+
+def _scaled(half):
+    """Coordinates times numbers of other nodes, which need no bake."""
+    material, tree, bsdf = shader("scaled", "BsdfPrincipled")
+    number, place = node_of(tree, "Value"), node_of(tree, "CombineXYZ", X=0.25)
+    number.outputs[0].default_value = 3.0
+    mapped = node_of(tree, "Mapping", Scale=number, Location=place)
+    fill(tree, mapped, {"Vector": node_of(tree, "UVMap")})
+    texture = picture(tree, half)
+    fill(tree, texture, {"Vector": mapped})
+    fill(tree, bsdf, {"Base Color": texture})
     return material
