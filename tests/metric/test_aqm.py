@@ -82,6 +82,17 @@ def test_invalid_pixels_neither_ring_nor_count(aqm, textured):
     assert aqm.compare(textured + 9, textured, valid=np.zeros_like(valid)).score == 0.0
 
 
+def test_pixels_beside_invalid_ones_move_as_they_do(aqm):
+    bars = (50.0 + 10.0 * np.cos(np.pi * np.arange(160) / 2.0) * np.ones((128, 1))).astype(np.float32)
+    reference, velocity = np.full(bars.shape, 50.0, np.float32), moving(bars.shape, 20.0, 0.0)
+    valid = np.ones(bars.shape, bool)
+    valid[::8] = False
+    velocity[~valid] = 0.0
+    jnd = aqm.compare(bars, reference, velocity=velocity, valid=valid).jnd
+    everywhere = aqm.compare(bars, reference, velocity=moving(bars.shape, 20.0, 0.0)).jnd
+    assert np.median(jnd[valid]) == pytest.approx(np.median(everywhere), rel=0.5)
+
+
 def test_borders_do_not_ring(aqm):
     ramp = np.broadcast_to(np.linspace(5, 90, 160, dtype=np.float32), (128, 160)).copy()
     test = ramp.copy()

@@ -8,6 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
+import scipy.ndimage
 
 from enfilade.metric.cortex import ORIENTATIONS_DEG, Band
 from enfilade.metric.eye import (
@@ -199,13 +200,26 @@ class ChannelSensitivity:
 
 
 def coarse_velocity(velocity_deg_s: F32, valid: Mask) -> F32:
-    """Velocity at every second pixel, (H, W, 2) -> (2, h, w) float32; 0 where not valid."""
+    """Velocity at every second pixel, (H, W, 2) -> (2, h, w) float32; where invalid the nearest valid one.
+
+    Weights are interpolated between these samples: at rest, those of invalid pixels would be too large beside
+    moving ones.
+    """
     rows, columns = (
         np.minimum(FINEST_REDUCTION * np.arange(samples), pixels - 1)
         for samples, pixels in zip(halved_shape(valid.shape, FINEST_REDUCTION), valid.shape, strict=True)
     )
     here = np.ix_(rows, columns)
-    return np.where(valid[here], np.moveaxis(velocity_deg_s[here], -1, 0), np.float32(0.0))
+    is_missing = ~valid[here]
+    velocity = np.moveaxis(velocity_deg_s[here], -1, 0)
+    if is_missing.all():
+        return np.zeros_like(velocity)
+    if is_missing.any():
+        nearest = scipy.ndimage.distance_transform_edt(
+            is_missing, return_distances=False, return_indices=True
+        )
+        velocity = velocity[:, *nearest]
+    return np.ascontiguousarray(velocity)
 
 
 def _reduction(band: Band) -> int:

@@ -79,3 +79,15 @@ def test_stretched_pixels_are_filtered_less(pair):
     assert peaks[0] == pytest.approx(1 / (2 * np.pi * (7 / 4 - 1 / 4)), rel=0.02)
     assert peaks[1] == pytest.approx(1 / (2 * np.pi * (7 / 4 - 1 / 2)), rel=0.02)
     assert peaks[2] == 1.0
+
+
+def test_different_footprints_bring_no_difference_of_equal_colors(pair):
+    is_compared = np.zeros((48, 64), bool)
+    is_compared[10:40, 20:40] = True
+    color = np.where(is_compared[..., None], np.float32(0.5), np.float32(0.05)) * np.ones(3, np.float32)
+    sharp, stretched = (
+        dataclasses.replace(colored(one, color), footprint=np.full((48, 64), footprint, np.float32))
+        for one, footprint in zip(pair, (0.1, 0.75), strict=True)
+    )
+    shown = shown_alike(sharp, stretched, is_compared, np.full((48, 64), 3.0, np.float32))
+    assert np.abs(shown[0].color - shown[1].color)[is_compared].max() < 1e-6

@@ -23,8 +23,7 @@ FINEST = 0.75
 def shown_alike(before: Warped, after: Warped, is_compared: Mask, support_px: F32) -> tuple[Halves, Halves]:
     """Both warped keyframes through the filter of §5, each as far as its own footprint allows.
 
-    Pixels that are not compared have the same colour in both, so that the filter brings no difference into
-    their neighbours.
+    Pixels that are not compared are left out of the filter, and have the same colour in both.
 
     Parameters
     ----------
@@ -43,9 +42,12 @@ def shown_alike(before: Warped, after: Warped, is_compared: Mask, support_px: F3
 
 
 def _shown(warped: Warped, is_compared: Mask, filler: F32, support_px: F32) -> Halves:
+    where = is_compared[..., None]
     support = _remaining_support(warped.footprint, support_px)
+    weight = reconstruct(np.broadcast_to(where, filler.shape).astype(np.float32), support)
+    divisor = np.where(where, weight, np.float32(1))
     first, second = (
-        reconstruct(np.where(is_compared[..., None], half, filler), support)
+        np.where(where, reconstruct(np.where(where, half, np.float32(0)), support) / divisor, filler)
         for half in (warped.shading.first, warped.shading.second)
     )
     return Halves(first, second)

@@ -40,7 +40,7 @@ class Paper(Method):
     """The published method."""
 
     name = "paper"
-    revision = 7
+    revision = 8
     settings = (
         TraceSettings,
         SamplingSettings,
