@@ -32,8 +32,9 @@ def albedo(bsdf):
     si = dr.zeros(mi.SurfaceInteraction3f, COUNT)
     si.shape = mi.ShapePtr(scene.shapes()[0])
     si.t, si.wi = mi.Float(1.0), dr.normalize(mi.Vector3f(0.4, 0.0, 1.0))
-    *_, diffuse = lobes.sample_diffuse(si, si.bsdf(), sampler, mi.Bool(True))
-    _, _, specular, *_ = lobes.sample_specular(si, si.bsdf(), sampler)
+    own = lobes.albedo(si, si.bsdf(), mi.Bool(True))
+    *_, diffuse = lobes.sample_diffuse(si, si.bsdf(), own, sampler, mi.Bool(True))
+    _, _, specular, *_ = lobes.sample_specular(si, si.bsdf(), own, sampler)
     return sum(float(np.mean(np.array(mi.Color3f(weight)))) for weight in (diffuse, specular))
 
 

@@ -55,7 +55,8 @@ MIN_ALBEDO_SAMPLES = 16  # of a bin; with fewer its albedo is taken to be one
 class Lobes:
     """The BSDFs of a scene, split.
 
-    Directions are in the local frame of the interaction `si`.
+    Directions are in the local frame of the interaction `si`. Methods that evaluate or sample a lobe take the
+    :meth:`albedo` there, which is costly.
 
     Parameters
     ----------
@@ -157,29 +158,29 @@ class Lobes:
         base: Any = dr.reinterpret_array(mi.BSDFPtr, dr.select(si.wi.z > 0.0, *numbers))
         return base
 
-    def eval_diffuse(self, si: Any, bsdf: Any, wo: Any, active: Any) -> tuple[Any, Any]:
+    def eval_diffuse(self, si: Any, bsdf: Any, albedo: Any, wo: Any, active: Any) -> tuple[Any, Any]:
         """Diffuse lobe times cosine, and the density of :meth:`sample_diffuse`."""
         is_whole = _of(self._whole, si, bsdf)
         value, pdf = bsdf.eval_pdf(self._diffuse, si, wo, active & ~is_whole)
-        lambert, lambert_pdf = _lambert(si, wo, self.albedo(si, bsdf, active & is_whole))
+        lambert, lambert_pdf = _lambert(si, wo, albedo)
         return dr.select(is_whole, lambert, value), dr.select(is_whole, lambert_pdf, pdf)
 
-    def sample_diffuse(self, si: Any, bsdf: Any, sampler: Any, active: Any) -> tuple[Any, Any, Any]:
+    def sample_diffuse(
+        self, si: Any, bsdf: Any, albedo: Any, sampler: Any, active: Any
+    ) -> tuple[Any, Any, Any]:
         """Direction, density and weight of a sample of the diffuse lobe."""
         is_whole = _of(self._whole, si, bsdf)
         second, first = mi.Point2f(sampler.next_2d()), sampler.next_1d()
         sample, weight = bsdf.sample(self._diffuse, si, first, second, active & ~is_whole)
         up = _cosine_direction(si, second)
-        albedo = self.albedo(si, bsdf, active & is_whole)
         wo = dr.select(is_whole, up, sample.wo)
         pdf = dr.select(is_whole, dr.abs(up.z) / dr.pi, sample.pdf)
         return wo, pdf, dr.select(is_whole, albedo, weight)
 
-    def eval_specular(self, si: Any, bsdf: Any, wo: Any, active: Any) -> tuple[Any, Any]:
+    def eval_specular(self, si: Any, bsdf: Any, albedo: Any, wo: Any, active: Any) -> tuple[Any, Any]:
         """Specular lobes times cosine, and the density of :meth:`sample_specular`."""
         is_whole = _of(self._whole, si, bsdf)
         value, pdf = bsdf.eval_pdf(self._specular, si, wo, active & ~is_whole)
-        albedo = self.albedo(si, bsdf, active & is_whole)
         difference, mixture_pdf = self._difference(si, bsdf, wo, albedo, active & is_whole)
         return dr.select(is_whole, difference, value), dr.select(is_whole, mixture_pdf, pdf)
 
@@ -229,7 +230,7 @@ class Lobes:
         return sample.wo, weight
 
     def sample_specular(
-        self, si: Any, bsdf: Any, sampler: Any, choice: Any = None, branch: Any = None
+        self, si: Any, bsdf: Any, albedo: Any, sampler: Any, choice: Any = None, branch: Any = None
     ) -> tuple[Any, ...]:
         """Direction, density, weight of a sample; whether it is of a delta lobe, and if a null interaction.
 
@@ -242,7 +243,6 @@ class Lobes:
         is_whole = _of(self._whole, si, bsdf)
         first, second = sampler.next_1d(), mi.Point2f(sampler.next_2d())
         is_masked = is_whole & _of(self._lambertian, si, bsdf)
-        albedo = self.albedo(si, bsdf, is_whole)
         share = _bsdf_share(albedo)
         by_bsdf = sampler.next_1d() < share
         if choice is not None:
@@ -314,7 +314,8 @@ class Lobes:
         start, end = random_point(), random_point()
         si = self._scene.ray_intersect(mi.Ray3f(start, dr.normalize(end - start)))
         bsdf = si.bsdf()
-        _, pdf, weight, *_ = self.sample_specular(si, bsdf, sampler)
+        albedo = self.albedo(si, bsdf, si.is_valid())
+        _, pdf, weight, *_ = self.sample_specular(si, bsdf, albedo, sampler)
         value = dr.select(pdf > 0.0, dr.max(dr.abs(weight)), 0.0)
         entry = _albedo_entry(_number(bsdf), si.wi.z)
         dr.eval(value, entry)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -135,16 +136,17 @@ class LightTransport:
 
     def sharp_light(self, point: ShadingPoint, sampler: Any, *, specular: bool = False) -> tuple[Any, Any]:
         """See :meth:`enfilade.renderer.LobeRenderer.sharp_light`."""
-        si, albedo = point.native, point.surfaces.albedo
-        bsdf = si.bsdf()
+        si, bsdf, albedo = _lobes_of(point)
         is_diffuse = si.is_valid() & (dr.max(albedo) > MIN_DIFFUSE_ALBEDO)
         is_glossy = point.has_specular & self._lobes.has_glossy(si, bsdf) & specular
 
         def evaluate(direction: Any) -> list[tuple[Any, Any]]:
             wo = si.to_local(direction)
-            value, pdf = self._lobes.eval_diffuse(si, bsdf, wo, is_diffuse)
+            value, pdf = self._lobes.eval_diffuse(si, bsdf, albedo, wo, is_diffuse)
             lobes = [(_divided(value, albedo), pdf)]
-            return [*lobes, self._lobes.eval_specular(si, bsdf, wo, is_glossy)] if specular else lobes
+            if specular:
+                lobes.append(self._lobes.eval_specular(si, bsdf, albedo, wo, is_glossy))
+            return lobes
 
         active, factors = is_diffuse | is_glossy, [albedo, 1.0][: 2 if specular else 1]
         found = self.sharp_emitters.estimate(si, sampler, evaluate, factors, active)
@@ -164,11 +166,15 @@ class LightTransport:
         self, point: ShadingPoint, sampler: Any, *, soft_only: bool = False, guide: PathGuide | None = None
     ) -> BsdfSample:
         """See :meth:`enfilade.renderer.LobeRenderer.sample_diffuse`."""
-        si, albedo = point.native, point.surfaces.albedo
+        si, bsdf, albedo = _lobes_of(point)
         active = si.is_valid() & (dr.max(albedo) > MIN_DIFFUSE_ALBEDO)
-        bsdf = si.bsdf()
-        direct = self._next_event(si, bsdf, self._lobes.eval_diffuse, sampler, active, albedo, soft_only)
-        wo, pdf, weight = self._lobes.sample_diffuse(si, bsdf, sampler, active)
+
+        def evaluate(wo: Any, is_lit: Any) -> tuple[Any, Any]:
+            value, pdf = self._lobes.eval_diffuse(si, bsdf, albedo, wo, is_lit)
+            return _divided(value, albedo), pdf
+
+        direct = self._next_event(si, evaluate, sampler, active, soft_only=soft_only)
+        wo, pdf, weight = self._lobes.sample_diffuse(si, bsdf, albedo, sampler, active)
         if guide is not None:
             wo, pdf, weight = self._guided(guide, point, sampler, active, wo, pdf, weight)
         ray = si.spawn_ray(si.to_world(wo))
@@ -191,14 +197,13 @@ class LightTransport:
         The density that is returned is that of the lobe: it serves multiple importance sampling, whose
         weights may be any that add up to one, and these do so whatever the guide.
         """
-        si = point.native
-        bsdf = si.bsdf()
+        si, bsdf, albedo = _lobes_of(point)
         mixture = GuidedLobe(guide, point.position, point.surfaces.normal)
         numbers = sampler.fork(GUIDE_SALT)
         direction, is_guided = mixture.sample(numbers.next_1d(), numbers.next_2d())
         is_guided &= active
         towards = si.to_local(mi.Vector3f(direction))
-        value, own_pdf = self._lobes.eval_diffuse(si, bsdf, towards, is_guided)
+        value, own_pdf = self._lobes.eval_diffuse(si, bsdf, albedo, towards, is_guided)
         wo, pdf = dr.select(is_guided, towards, wo), dr.select(is_guided, own_pdf, pdf)
         value = dr.select(is_guided, value, weight * pdf)
         density = mixture.pdf(Array3f(si.to_world(wo)), pdf)
@@ -214,9 +219,10 @@ class LightTransport:
         soft_only: bool = False,
     ) -> BsdfSample:
         """See :meth:`enfilade.renderer.LobeRenderer.sample_specular`."""
-        si = point.native
-        bsdf = si.bsdf()
-        wo, pdf, weight, is_delta, is_null = self._lobes.sample_specular(si, bsdf, sampler, choice, branch)
+        si, bsdf, albedo = _lobes_of(point)
+        wo, pdf, weight, is_delta, is_null = self._lobes.sample_specular(
+            si, bsdf, albedo, sampler, choice, branch
+        )
         # Total reflection at a clear interface has a density of one, and no other branch.
         is_split = self._lobes.is_clear(si, bsdf) & (pdf < 1.0)
         # Delta lobes reflect nothing from a sampled point: spare its shadow ray.
@@ -225,9 +231,8 @@ class LightTransport:
             is_rough = self._lobes.is_rough_interface(si, bsdf)
             is_split |= is_rough
             has_glossy &= ~is_rough | (branch == int(Branch.REFLECTED))  # that of both branches at once
-        direct = self._next_event(
-            si, bsdf, self._lobes.eval_specular, sampler, has_glossy, soft_only=soft_only
-        )
+        evaluate = partial(self._lobes.eval_specular, si, bsdf, albedo)
+        direct = self._next_event(si, evaluate, sampler, has_glossy, soft_only=soft_only)
         ray = si.spawn_ray(si.to_world(wo))
         bounce = Bounce(Array3f(si.p), pdf, Bool(is_delta), Bool(soft_only))
         is_passed = self._shadow_rays.is_passed(si, bsdf, is_null)
@@ -243,18 +248,12 @@ class LightTransport:
         )
 
     def _next_event(
-        self,
-        si: Any,
-        bsdf: Any,
-        evaluate: Any,
-        sampler: Any,
-        active: Any,
-        albedo: Any = None,
-        soft_only: bool = False,
+        self, si: Any, evaluate: Callable[[Any, Any], Any], sampler: Any, active: Any, *, soft_only: bool
     ) -> Any:
-        """Radiance of a lobe from one point on the emitters, MIS-weighted, divided by the albedo.
+        """Radiance of a lobe from one point on the emitters, MIS-weighted.
 
         The point is chosen among one candidate for each of the emitters, or :data:`MOST_CANDIDATES`.
+        `evaluate` takes directions, and where they count; it returns the lobe's value and density.
         """
 
         def candidate(place: Any) -> tuple[Target, Contributions]:
@@ -263,9 +262,7 @@ class LightTransport:
             else:
                 emitter, radiance = self._scene.sample_emitter_direction(si, place, False, active)
             is_lit = active & (emitter.pdf != 0.0)
-            value, pdf = evaluate(si, bsdf, si.to_local(emitter.d), is_lit)
-            if albedo is not None:
-                value = _divided(value, albedo)
+            value, pdf = evaluate(si.to_local(emitter.d), is_lit)
             weight = dr.select(emitter.delta, 1.0, mis_weight(emitter.pdf, pdf))
             return Target(emitter.p, emitter.delta), (
                 Array3f(dr.select(is_lit, value * radiance * weight, 0.0)),
@@ -275,6 +272,12 @@ class LightTransport:
         target, light = resample(candidate, min(max(emitters, 1), MOST_CANDIDATES), sampler)
         (found,) = self._shadow_rays.unoccluded(si, target, light, active)
         return found
+
+
+def _lobes_of(point: ShadingPoint) -> tuple[Any, Any, Any]:
+    """Mitsuba's interaction, its BSDF, and the albedo of its diffuse lobe."""
+    si = point.native
+    return si, si.bsdf(), mi.Color3f(point.surfaces.albedo)
 
 
 def _divided(lobe: Any, albedo: Any) -> Any:
