@@ -8,7 +8,7 @@ import drjit as dr
 import numpy as np
 import scipy.ndimage
 
-from enfilade.arrays import Array3f, Array4f, Float, image, lanes
+from enfilade.arrays import Array3f, Array4f, image, lanes
 from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.decoupled.wavelet import guide_of, smooth
@@ -20,7 +20,6 @@ EXTENSION, JITTER = 2.5, 1  # pixels: of guides beyond the sampled ones, and of 
 NOISE_SHARE = 0.25  # of the variance of irradiance: low-discrepancy samples have less noise than it tells
 OUTLIER = 64.0  # times the denoised irradiance: brighter estimates are limited where the mean is kept
 LEVELS = 5  # of the wavelet that smooths the correction: 32 pixels to each side
-NEGATIVE_LEVELS = 3  # of that which smooths negative light: 8 pixels
 
 
 def denoise_irradiance(
@@ -79,7 +78,7 @@ def denoise_light(
     highlight does not brighten the dark surface around it. A highlight of a few pixels thus keeps some of its
     noise.
     Outliers are limited, so that no single path tints a surface. The denoiser takes no negative light, which
-    is smoothed along surfaces: specular lobes that are a difference have it, and so has indirect light behind
+    is denoised apart: specular lobes that are a difference have it, and so has indirect light behind
     cut-outs and thin glass, where the expectation of what paths find by chance is subtracted.
 
     Parameters
@@ -103,19 +102,17 @@ def denoise_light(
     -------
     (H, W, 3) float32
     """
-    # Denoise; smooth light below zero.
-    guide, positive = guide_of(geometry, where), np.maximum(light.color, np.float32(0))
+    # Denoise, light below zero apart.
+    positive = np.maximum(light.color, np.float32(0))
     above = _denoised(positive, geometry, where, quality, is_extended=is_extended)
     below: F32 | np.float32 = np.float32(0)
     if light.color.min() < 0.0:
-        negative, _ = smooth(
-            lanes(positive - light.color), Float(0), guide, levels=NEGATIVE_LEVELS, deviations=None
-        )
-        below = image(negative, *where.shape)
+        below = _denoised(positive - light.color, geometry, where, quality, is_extended=is_extended)
 
     # Smooth the difference, and the luminance.
     clean, lowest = above - below, -np.float32(outlier) * below
     limited = np.clip(light.color, lowest, np.float32(outlier) * above)
+    guide = guide_of(geometry, where)
     weights = Array3f(*REC709_LUMINANCE)
     luminance = dr.dot(lanes(above + below), weights)
     smoothed, variance = smooth(
