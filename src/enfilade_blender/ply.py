@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 F32 = npt.NDArray[np.float32]
 I32 = npt.NDArray[np.int32]
+FLAT = 1e-4  # extent of a mesh across its plane, relative to that along it
 UNIT = 1e-2  # deviation of a normal's length from 1
 
 
@@ -130,6 +131,12 @@ class Mesh:
         edges.sort(axis=1)
         _, counts = np.unique(edges[:, 0] * (len(self.positions) + 1) + edges[:, 1], return_counts=True)
         return bool((counts == 2).all())
+
+    def is_flat(self) -> bool:
+        """Whether all vertices lie in a plane."""
+        centred = self.positions.astype(np.float64) - self.positions.mean(axis=0)
+        smallest, _, largest = np.linalg.eigvalsh(centred.T @ centred)
+        return bool(smallest <= FLAT**2 * largest)
 
     def volume(self) -> float:
         """Volume inside a closed mesh; negative where its triangles face inward."""

@@ -98,6 +98,7 @@ class Shapes:
         self._bakery = Bakery(job, selection, views, self.textures, notes)
         self._shaders: dict[Any, Shader] = {}
         self._surfaces: dict[Any, tuple[str, Surface]] = {}
+        self._radiances: dict[str, Any] = {}  # by the id of the BSDF
         self._bsdfs: list[Element] = []
         self._baked: list[str] = []  # ids of the BSDFs of one object
         self.kinds: set[str] = set()
@@ -168,19 +169,18 @@ class Shapes:
             has_relief = any(normal is not None for normal in normals_of(material.shader))
             is_back_seen = has_relief and self._shows_its_back(part.mesh, placed)
             material = replace(material, is_back_seen=is_back_seen)
-            surface = self._surface(material)[1]
+            identifier, surface = self._surface(material)
             if surface.is_invisible and not surface.emitted:
                 continue
             if material.uv is None and any(e.get("name") == "alpha_u" for e in surface.plain().iter()):
                 # Highlights are stretched along the UV map.
                 material = replace(material, uv=mesh.active_uv or None)
-            radiance = surface.radiance(self._context(part.material))
-            is_lamp = not placed.is_seen and surface.bsdf is None and radiance is not None
-            if not placed.is_seen:
-                self._note_unseen(placed, is_lamp=is_lamp)
+            radiance = self._radiances[identifier]
             mesh = _with_maps(mesh, material.uv, material.attribute)
             if is_instanced and radiance is None:
                 instanced += self._shapes_of(f"{name} mesh", mesh, material, None)
+                if not placed.is_seen:
+                    self._note_unseen(placed, is_lamp=False)
                 continue
             mesh = joined([mesh.transformed(matrix) for matrix in placed.matrices])
             if radiance is not None and mesh.area() == 0.0:
@@ -188,11 +188,16 @@ class Shapes:
                 self._notes.add("not-carried", name, "Emission", what, effect)
                 radiance = None
             shapes = self._shapes_of(name, mesh, material, radiance)
-            if radiance is not None and not (
-                is_one(surface.opacity) and self._hides_its_back(part.mesh, placed)
-            ):
+            is_lit = radiance is not None
+            has_back = is_lit and not (is_one(surface.opacity) and self._hides_its_back(part.mesh, placed))
+            if has_back:
                 shapes += self._shapes_of(f"{name} back", _back(mesh), material, radiance)
-            elements += [_as_lamp(shape) for shape in shapes] if is_lamp else shapes
+            # One that is not flat would shine through its near side: it stays black.
+            if not placed.is_seen:
+                is_lamp = is_lit and surface.bsdf is None and (part.mesh.is_flat() or not has_back)
+                self._note_unseen(placed, is_lamp=is_lamp)
+                shapes = [_as_lamp(shape) for shape in shapes] if is_lamp else shapes
+            elements += shapes
         return elements + (self._instances(placed, instanced) if instanced else [])
 
     def _note_unseen(self, placed: Placed, *, is_lamp: bool) -> None:
@@ -315,6 +320,7 @@ class Shapes:
         if of.is_own:
             self._baked.append(identifier)
         self._surfaces[key] = identifier, surface
+        self._radiances[identifier] = surface.radiance(context)
         return identifier, surface
 
     def _context(self, material: Any, *, is_mirrored: bool = False) -> Context:

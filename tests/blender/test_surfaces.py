@@ -127,8 +127,8 @@ def test_a_mix_with_a_mirror_keeps_its_energy(context):
     assert albedo(mix, context) == pytest.approx(0.75, rel=0.01)
 
 
-@pytest.mark.parametrize(("convention", "green"), [("OPENGL", None), ("DIRECTX", 0.2)])
-def test_normal_maps_of_directx_have_green_downwards(context, monkeypatch, convention, green):
+@pytest.mark.parametrize(("is_flipped", "green"), [(False, None), (True, 0.2)])
+def test_normal_maps_of_directx_have_green_downwards(context, monkeypatch, is_flipped, green):
     written = []
 
     def write(_self, _name, image, **_options):
@@ -137,11 +137,9 @@ def test_normal_maps_of_directx_have_green_downwards(context, monkeypatch, conve
 
     monkeypatch.setattr(Textures, "pixels", lambda *_: np.full((2, 2, 3), (0.5, 0.8, 0.9), np.float32))
     monkeypatch.setattr(Textures, "write", write)
-    node = SimpleNamespace(type="NORMAL_MAP", convention=convention)
+    output = Output(SimpleNamespace(node=SimpleNamespace(type="NORMAL_MAP")))
     texture = Texture("textures/tilted.png", "UVMap", (0.5, 0.8, 0.9), raw=True)
-    bsdf = with_normal(
-        plugin("bsdf", "diffuse"), NormalMap(texture, 1.0, Output(SimpleNamespace(node=node))), context
-    )
+    bsdf = with_normal(plugin("bsdf", "diffuse"), NormalMap(texture, 1.0, output, is_flipped), context)
     name = bsdf.find("texture/string[@name='filename']").get("value")
     assert name == ("textures/tilted.png" if green is None else "textures/flipped.png")
     assert [float(image[..., 1].mean()) for image in written] == pytest.approx(

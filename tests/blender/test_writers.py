@@ -85,11 +85,17 @@ def test_a_flattened_mesh_has_the_normals_of_its_triangles():
     assert np.linalg.norm(point.normals, axis=-1) == pytest.approx(1.0)
 
 
-def test_a_square_is_open_and_a_tetrahedron_closed():
+def test_a_square_is_flat_and_open_and_a_tetrahedron_closed():
+    turned = square().transformed(
+        np.array([[0.6, 0, 0.8, 900], [0, 1, 0, 0], [-0.8, 0, 0.6, 5], [0, 0, 0, 1]])
+    )
+    assert turned.is_flat()
     assert not square().is_closed()
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)
     triangles = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], np.int32)
-    assert Mesh(points, triangles, np.zeros((4, 3, 3), np.float32), {}, {}, np.zeros(4, np.int32)).is_closed()
+    solid = Mesh(points, triangles, np.zeros((4, 3, 3), np.float32), {}, {}, np.zeros(4, np.int32))
+    assert solid.is_closed()
+    assert not solid.is_flat()
 
 
 def test_joined_copies_keep_their_corners():

@@ -195,9 +195,9 @@ OBJECTS = (
         "missing",
     ),
     (
-        "Meshes that only emit, and that the camera does not see",
+        "Meshes that only emit, are flat or closed, and that the camera does not see",
         "approximated",
-        "not seen by the camera; they cast no shadows",
+        "lamps: the camera does not see them; they cast no shadows",
     ),
     (
         "Other ray visibility of meshes, shadow catcher, holdout, indirect only",

@@ -90,12 +90,12 @@ class Bakery:
             return shader, mesh, False
         if len(uv_maps) <= 1 and all(isinstance(v, Procedural) and v.uv_map is not None for v in wanted):
             return replaced(shader, lambda value: self._over_uv(value, material)), mesh, False
-        wanted = self._resolution(copies, mesh)
+        side = self._resolution(copies, mesh)
         shader = self._with_baked_normals(shader)
         mesh = _with_room(mesh, shader)
         with self._stage().mesh(mesh, placed) as canvas:
             mesh = replace(mesh, uvs={**mesh.uvs, BAKED_UV: canvas.unwrap()}, active_uv=BAKED_UV)
-            own = replaced(shader, lambda value: self._over_mesh(value, material, canvas, placed, wanted))
+            own = replaced(shader, lambda value: self._over_mesh(value, material, canvas, placed, side))
         return own, mesh, True
 
     def _stage(self) -> BakeScene:
@@ -205,6 +205,8 @@ class Bakery:
 
     def _resolution(self, copies: list[np.ndarray], mesh: Mesh) -> int:
         """Side of a baked texture, a power of two, by the largest size of a mesh's copies in the views."""
+        if not self._views:
+            return self._job.bake_px
         bounds = np.stack([mesh.positions.min(axis=0), mesh.positions.max(axis=0)])
         matrices = np.array(copies[:: max(len(copies) // SEEN_COPIES, 1)])
         ends = bounds @ matrices[:, :3, :3].transpose(0, 2, 1) + matrices[:, None, :3, 3]
@@ -215,8 +217,7 @@ class Bakery:
             distances = np.maximum(np.maximum(distances, 0.25 * radii), 1e-6)
             focal = 0.5 * view.projection[1, 1] * self._selection.size[1]
             nearest = max(nearest, float((2.0 * radii / distances * focal).max()))
-        wanted = nearest * PER_PIXEL if self._views else float(self._job.bake_px)
-        return int(2 ** int(np.ceil(np.log2(max(wanted, SMALLEST)))))
+        return 2 ** int(np.ceil(np.log2(max(nearest * PER_PIXEL, SMALLEST))))
 
 
 def _kind(value: Any) -> BakeKind:

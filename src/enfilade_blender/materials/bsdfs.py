@@ -315,7 +315,7 @@ def _is_void(value: Value, context: Context) -> bool:
 
 def _normal_texture(normal: NormalMap, context: Context) -> Element:
     value, is_turned = normal.image, context.is_back and normal.output.node.type == "NORMAL_MAP"
-    is_flipped = context.is_mirrored != (getattr(normal.output.node, "convention", "OPENGL") == "DIRECTX")
+    is_flipped = context.is_mirrored != normal.is_flipped
     is_as_is = abs(normal.strength - 1.0) < 1e-3 and not is_flipped and not is_turned
     if is_as_is or not isinstance(value, ImageValue | Texture):
         return context.textures.colour(value)

@@ -172,7 +172,8 @@ class Graph:
             image = _exact(self.value(node.inputs["Color"], inner))
             strength = self.value(node.inputs["Strength"], inner)
             if isinstance(strength, Constant) and (isinstance(image, ImageValue) or _is_of_uv(image)):
-                return NormalMap(image, strength.number, found)
+                is_flipped = getattr(node, "convention", "OPENGL") == "DIRECTX"
+                return NormalMap(image, strength.number, found, is_flipped)
         if node.type == "BUMP" and not node.inputs["Normal"].is_linked:
             height = _exact(self.value(node.inputs["Height"], inner))
             strength, distance = (self.value(node.inputs[name], inner) for name in ("Strength", "Distance"))

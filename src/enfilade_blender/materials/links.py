@@ -91,18 +91,22 @@ def uv_coordinates(socket: Any, groups: tuple[Any, ...]) -> tuple[str, Matrix3] 
 
 def _constant_vector(socket: Any, groups: tuple[Any, ...]) -> tuple[float, float, float] | None:
     """A finite vector that is the same everywhere, of numbers, vectors and colours; None of any other."""
-    found = follow(socket, groups)
-    if isinstance(found, Output):
-        if found.node.type == "COMBXYZ":
-            parts = [_constant_vector(part, found.groups) for part in found.node.inputs]
-            x, y, z = (None if part is None else part[0] for part in parts)
-            return None if x is None or y is None or z is None else (x, y, z)
-        if found.node.type not in ("RGB", "VALUE"):
-            return None
-        found = found.socket
-    value = found.default_value
-    numbers = (value,) * 3 if isinstance(value, int | float) else tuple(value)[:3]
+    numbers = _constant_numbers(socket, groups)
+    if len(numbers) == 1:
+        numbers *= 3
     return numbers if len(numbers) == 3 and all(map(math.isfinite, numbers)) else None
+
+
+def _constant_numbers(socket: Any, groups: tuple[Any, ...]) -> tuple[float, ...]:
+    """One number, or three of a vector or colour; none where it is no constant."""
+    found = follow(socket, groups)
+    if isinstance(found, Output) and found.node.type == "COMBXYZ":
+        parts = [_constant_numbers(part, found.groups) for part in found.node.inputs]
+        return tuple(part[0] for part in parts if len(part) == 1)
+    if isinstance(found, Output) and found.node.type not in ("RGB", "VALUE"):
+        return ()
+    value = (found.socket if isinstance(found, Output) else found).default_value
+    return (float(value),) if isinstance(value, int | float) else tuple(value)[:3]
 
 
 def upstream(output: Output, *, below_images: bool = True) -> Iterator[Output]:

@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from enfilade_blender.image_files import F32
 from enfilade_blender.materials import mapping
 from enfilade_blender.materials.bsdfs import (
     ALMOST,
@@ -42,38 +44,50 @@ from enfilade_blender.scene_xml import Element, plugin
 ONE = Constant((1.0, 1.0, 1.0))
 BLACK = (0.0, 0.0, 0.0)
 SHARP = 0.03  # roughness of a pane below which its reflections are sharp
+DIM = 0.25  # radiance below which a texture of 8 bits has too few levels
+
+
+@dataclass(frozen=True, eq=False)
+class Factor:
+    """A textured number that emitted radiance is multiplied by.
+
+    Attributes
+    ----------
+    value : Value
+    is_share : bool
+        Whether it is clipped to 0..1, as opacities and factors of mixes are; strengths are not.
+    is_inverted : bool
+        Whether 1 minus the share is meant.
+    """
+
+    value: Value
+    is_share: bool
+    is_inverted: bool
+
+    def of(self, numbers: F32) -> F32:
+        """The factors of the value's numbers."""
+        if not self.is_share:
+            return numbers
+        share: F32 = np.clip(numbers, np.float32(0), np.float32(1))
+        return np.float32(1) - share if self.is_inverted else share
 
 
 @dataclass(frozen=True, eq=False)
 class Radiance:
-    """Emitted radiance: a colour times numbers.
-
-    Attributes
-    ----------
-    colour : Value
-    strength : float
-    factors : tuple of (Value, bool)
-        Textured strengths, opacities, and factors of mixes; 1 minus the value where the second is true.
-    """
+    """Emitted radiance: a colour times a strength and factors."""
 
     colour: Value
-    strength: float
-    factors: tuple[tuple[Value, bool], ...] = ()
+    strength: float = 1.0
+    factors: tuple[Factor, ...] = ()
 
-    def scaled(self, factor: Value, *, is_inverted: bool) -> Radiance:
-        """The radiance times a number, or times 1 minus it."""
-        if isinstance(factor, Constant):
-            number = 1.0 - factor.number if is_inverted else factor.number
-            return replace(self, strength=self.strength * number)
-        return replace(self, factors=(*self.factors, (factor, is_inverted)))
-
-    def mean(self, context: Context) -> np.ndarray:
-        """Product of the means, (3,)."""
-        mean = self.strength * np.array(context.textures.mean(self.colour))
-        for factor, is_inverted in self.factors:
-            number = Constant(context.textures.mean(factor)).number
-            mean = mean * (1.0 - number if is_inverted else number)
-        return mean
+    def scaled(self, value: Value, *, is_share: bool = True, is_inverted: bool = False) -> Radiance:
+        """The radiance times a number; see :class:`Factor`."""
+        factor = Factor(value, is_share, is_inverted)
+        if isinstance(value, Constant):
+            return replace(
+                self, strength=self.strength * float(factor.of(np.array(value.number, np.float32)))
+            )
+        return replace(self, factors=(*self.factors, factor))
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +103,7 @@ class Surface:
     opacity_is_inverted : bool
         Whether 1 minus the value is the opacity.
     emitted : tuple of Radiance
-        Empty, or one.
+        Their sum is emitted.
     """
 
     bsdf: Element | None
@@ -118,50 +132,64 @@ class Surface:
 
     def radiance(self, context: Context) -> tuple[float, float, float] | Element | None:
         """Emitted radiance, or None."""
-        if not self.emitted:
-            return None
-        (radiance,) = self.emitted
-        values = [radiance.colour, *(value for value, _ in radiance.factors)]
-        images = [value for value in values if context.textures.has_pixels(value)]
-        if not images:
-            r, g, b = (max(float(c), 0.0) for c in radiance.mean(context))
+        textures = context.textures
+        values = [v for part in self.emitted for v in (part.colour, *(f.value for f in part.factors))]
+        images = [value for value in values if textures.has_pixels(value)]
+        if len(self.emitted) == 1 and images == values and len(values) == 1 and self._is_as_it_is:
+            return textures.colour(images[0])
+        place = images[0] if images else None
+        total = np.zeros((1, 1, 3), np.float32)
+        for part in self.emitted:
+            first, second = _of_one_size(total, _product(part, place, context))
+            total = first + second
+        total = np.maximum(total, np.float32(0))
+        if place is None:
+            r, g, b = (float(c) for c in total[0, 0])
             return (r, g, b) if max(r, g, b) > 0.0 else None
-        if images == values == [radiance.colour] and abs(radiance.strength - 1.0) < 1e-3:
-            return context.textures.colour(radiance.colour)
-        return _textured(radiance, images[0], context)
+        name = f"emission {zlib.crc32(total.tobytes()):08x}"
+        return textures.rewritten(place, total, name, raw=False, is_exact=bool(total.max() < DIM))
+
+    @property
+    def _is_as_it_is(self) -> bool:
+        return abs(self.emitted[0].strength - 1.0) < 1e-3
 
 
-def _textured(radiance: Radiance, place: ImageValue | Texture, context: Context) -> Element:
-    """A texture of emitted radiance, looked up as one of its images; others have to be mapped alike."""
-    textures, product = context.textures, np.full((1, 1, 3), radiance.strength, np.float32)
-    factors = [(value, is_inverted, False) for value, is_inverted in radiance.factors]
-    for value, is_inverted, is_colour in [(radiance.colour, False, True), *factors]:
-        if textures.has_pixels(value) and _placement(value) == _placement(place):
-            numbers = textures.pixels(value) if is_colour else textures.numbers(value)
-        else:
-            mean = textures.mean(value)
-            numbers = np.array(mean if is_colour else [Constant(mean).number], np.float32)[None, None]
-            if textures.has_pixels(value):
-                what, effect = "the mean of an image that is mapped differently", "its pattern is lost"
-                context.notes.add("approximated", context.owner, "Emission", what, effect)
-        product = _multiplied(product, 1.0 - numbers if is_inverted else numbers)
-    product = np.maximum(product, np.float32(0))
-    return textures.rewritten(place, product, f"emission {zlib.crc32(product.tobytes()):08x}", raw=False)
+def _product(part: Radiance, place: ImageValue | Texture | None, context: Context) -> F32:
+    """Radiance for each pixel of the images that are looked up as `place` is; of others the mean is taken."""
+    textures = context.textures
+
+    def pixels(value: Value, of: Callable[[ImageValue | Texture], F32], mean: Sequence[float]) -> F32:
+        if place is not None and textures.has_pixels(value):
+            if _lookup(value) == _lookup(place):
+                return of(value)
+            what, effect = "the mean of an image that is mapped differently", "its pattern is lost"
+            context.notes.add("approximated", context.owner, "Emission", what, effect)
+        return np.array(mean, np.float32)[None, None]
+
+    product = np.float32(part.strength) * pixels(part.colour, textures.pixels, textures.mean(part.colour))
+    for factor in part.factors:
+        mean = Constant(textures.mean(factor.value)).number
+        first, second = _of_one_size(product, factor.of(pixels(factor.value, textures.numbers, [mean])))
+        product = first * second
+    return product
 
 
-def _placement(value: ImageValue | Texture) -> tuple[Any, ...]:
+def _lookup(value: ImageValue | Texture) -> tuple[Any, ...]:
     """How an image is looked up at texture coordinates."""
     return value.matrix, value.node.extension if isinstance(value, ImageValue) else "REPEAT"
 
 
-def _multiplied(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Product of two images (H, W, 1 or 3), of the size of the larger one."""
+def _of_one_size(first: F32, second: F32) -> tuple[F32, F32]:
+    """Two images (H, W, 1 or 3), at the size of the larger one."""
     height, width, _ = np.maximum(first.shape, second.shape)
-    first, second = (
-        image[np.arange(height) * len(image) // height][:, np.arange(width) * image.shape[1] // width]
-        for image in (first, second)
-    )
-    return first * second
+
+    def resized(image: F32) -> F32:
+        rows, columns = (np.arange(n) * of // n for n, of in zip((height, width), image.shape, strict=False))
+        return (
+            image if len(rows) == len(image) and len(columns) == image.shape[1] else image[rows][:, columns]
+        )
+
+    return resized(first), resized(second)
 
 
 def _other(bsdf: Element, than: Element) -> Element | None:
@@ -294,18 +322,18 @@ def _cut_out(
 
 
 def _blended(first: Surface, second: Surface, mix: Mix, context: Context) -> Surface:
-    emitted = [part.scaled(mix.factor, is_inverted=True) for part in first.emitted]
-    emitted += [part.scaled(mix.factor, is_inverted=False) for part in second.emitted]
+    parts = [part.scaled(mix.factor, is_inverted=True) for part in first.emitted]
+    parts += [part.scaled(mix.factor) for part in second.emitted]
+    emitted = tuple(part for part in parts if part.strength > 0.0)
     if first.bsdf is None and second.bsdf is None and first.opacity == second.opacity:
-        return replace(first, emitted=_joined(emitted, mix, context))
-    parts = _masked(first, context), _masked(second, context)
-    bsdf = blended(*parts, context.textures.number(mix.factor))
-    return Surface(bsdf, emitted=_joined(emitted, mix, context))
+        return replace(first, emitted=emitted)
+    bsdfs = _masked(first, context), _masked(second, context)
+    return Surface(blended(*bsdfs, context.textures.number(mix.factor)), emitted=emitted)
 
 
 def _sum(add: Add, context: Context) -> Surface:
     first, second = _part(add.first, context), _part(add.second, context)
-    emitted = _joined([*first.emitted, *second.emitted], add, context)
+    emitted = (*first.emitted, *second.emitted)
     if first.bsdf is None and not first.is_invisible:
         return replace(second, emitted=emitted)
     if second.bsdf is None and not second.is_invisible:
@@ -324,26 +352,13 @@ def _masked(surface: Surface, context: Context) -> Element:
     return surface.plain() if is_one(surface.opacity) else surface.element(context)
 
 
-def _joined(emitted: list[Radiance], shader: Mix | Add, context: Context) -> tuple[Radiance, ...]:
-    """At most one radiance: constants are added, of textures the strongest is kept."""
-    lit = [part for part in emitted if part.strength > 0.0]
-    if len(lit) <= 1:
-        return tuple(lit)
-    if all(isinstance(part.colour, Constant) and not part.factors for part in lit):
-        r, g, b = (float(c) for c in sum(part.mean(context) for part in lit))
-        return (Radiance(Constant((r, g, b)), 1.0),)
-    what, effect = "of two emissions the stronger is kept", "the surface shines less"
-    context.notes.add("approximated", context.owner, shader.name, what, effect)
-    return (max(lit, key=lambda part: float(part.mean(context).sum())),)
-
-
 def _radiance(colour: Value, strength: Value, context: Context) -> tuple[Radiance, ...]:
     if _takes_light(colour, strength):
         what, effect = "its negative light is left out", "surfaces are brighter: Blender takes light away"
         context.notes.add("not-carried", context.owner, "Emission", what, effect)
     if is_zero_exactly(strength) or is_zero_exactly(colour):
         return ()
-    return (Radiance(colour, 1.0).scaled(strength, is_inverted=False),)
+    return (Radiance(colour).scaled(strength, is_share=False),)
 
 
 def _takes_light(colour: Value, strength: Value) -> bool:

@@ -187,13 +187,25 @@ class Textures:
             write_png(self._folder / file, image if raw else srgb_from_linear(image))
         return file
 
-    def rewritten(self, value: ImageValue | Texture, image: F32, name: str, *, raw: bool = True) -> Element:
-        """A texture in the place of another, of other numbers (H, W, 1 or 3); colours are not `raw`."""
+    def rewritten(
+        self,
+        value: ImageValue | Texture,
+        image: F32,
+        name: str,
+        *,
+        raw: bool = True,
+        is_exact: bool = False,
+    ) -> Element:
+        """A texture in the place of another, of other numbers (H, W, 1 or 3); colours are not `raw`.
+
+        It is exact if the other one is, too.
+        """
         key = (value.file,) if isinstance(value, Texture) else _key(value)
         key = *key, name
         if key not in self._files:
             stem = Path(key[0]).stem
-            is_exact = value.file.endswith(".exr") if isinstance(value, Texture) else value.image.is_float
+            is_float = value.file.endswith(".exr") if isinstance(value, Texture) else value.image.is_float
+            is_exact = is_exact or is_float
             image = image.astype(np.float32)
             self._files[key] = self.write(f"{stem} {name}", image, raw=raw, is_exact=is_exact)
         raw = raw or self._files[key].endswith(".exr")

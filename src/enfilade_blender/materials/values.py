@@ -140,11 +140,12 @@ Value = Constant | ImageValue | AttributeValue | Procedural | Texture
 
 @dataclass(frozen=True)
 class NormalMap:
-    """Tangent-space normals of an image: `output` of a node Normal Map."""
+    """Tangent-space normals of an image: `output` of a node Normal Map; `is_flipped`: green is downwards."""
 
     image: Value
     strength: float
     output: Output
+    is_flipped: bool = False
 
 
 @dataclass(frozen=True)

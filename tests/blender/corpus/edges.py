@@ -636,9 +636,9 @@ def leaves(folder):
 
 
 def masked_light(_folder):
-    """Signs of which a fourth shines: by their opacity, a mix, a strength; and a lamp that no camera sees.
+    """Signs of which a fourth shines: by their opacity, mixes, a strength; and lamps that no camera sees.
 
-    The camera looks down through the lamp.
+    The camera looks down through one of the lamps. Factors above 1 and nested ones are clipped.
     """
     scene = new_file()
     scene.camera.location, scene.camera.rotation_euler = (0.0, 0.0, 12.0), (0.0, 0.0, 0.0)
@@ -656,11 +656,29 @@ def masked_light(_folder):
     fill(tree, mix, {0: mask, 1: node_of(tree, "BsdfDiffuse", Color=(0, 0, 0, 1)), 2: glow})
     strip, tree, glow = shader("strip", "Emission", Color=(0.2, 0.5, 1.0, 1.0))
     fill(tree, glow, {"Strength": mask})
+    two, tree, mix = shader("two", "MixShader")
+    red, blue = (node_of(tree, "Emission", Color=c, Strength=0.01) for c in ((1, 0, 0, 1), (0, 0, 1, 1)))
+    fill(tree, mix, {0: mask, 1: red, 2: blue})
+    nested, tree, mix = shader("nested", "MixShader")
+    factor = node_of(tree, "Math")
+    factor.operation = "MULTIPLY"
+    fill(tree, factor, {0: mask, 1: 5.0})
+    inner = node_of(tree, "MixShader")
+    black, glow = node_of(tree, "BsdfDiffuse", Color=(0, 0, 0, 1)), node_of(tree, "Emission", Strength=0.5)
+    fill(tree, inner, {0: factor, 1: glow, 2: black})
+    fill(tree, mix, {0: factor, 1: inner, 2: black})
     for number, material in enumerate((cut, mixed, strip)):
         plane(material.name, (2.0 * number - 3.0, 0.0, 0.0), 1.8, material)
+    for number, material in enumerate((two, nested)):
+        plane(material.name, (2.0 * number - 3.0, 2.0, 0.0), 1.8, material)
     plane("lit", (3.0, 0.0, 0.0), 1.8, shader("lit", "BsdfDiffuse", Color=(0.5, 0.5, 0.5, 1))[0])
     panel = plane("Panel", (0.0, 0.0, 6.0), 4.0, shader("panel", "Emission", Strength=5.0)[0])
-    panel.visible_camera = False
+    bpy.ops.mesh.primitive_cylinder_add(
+        radius=1.0, depth=2.0, end_fill_type="NOTHING", location=(9.0, 0.0, 3.0)
+    )
+    tube = bpy.context.object
+    tube.data.materials.append(shader("tube", "Emission", Strength=5.0)[0])
+    panel.visible_camera = tube.visible_camera = False
 
 
 def lamps_in_the_way(folder):
