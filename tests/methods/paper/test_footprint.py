@@ -75,9 +75,9 @@ def test_stretched_pixels_are_filtered_less(pair):
             colored(pair[0], impulse), footprint=np.full((48, 64), 0.25 * magnification, np.float32)
         )
         peaks.append(shown_alike(one, one, np.ones((48, 64), bool), support)[0].color[24, 32, 0])
-    # Variance 1 of the filter and 3/4 of the finest structure, less the footprint.
-    assert peaks[0] == pytest.approx(1 / (2 * np.pi * (7 / 4 - 1 / 4)), rel=0.02)
-    assert peaks[1] == pytest.approx(1 / (2 * np.pi * (7 / 4 - 1 / 2)), rel=0.02)
+    # Variance 1 of the filter and 1/3 of an interpolated pixel, less the footprint.
+    assert peaks[0] == pytest.approx(1 / (2 * np.pi * (4 / 3 - 1 / 4)), rel=0.02)
+    assert peaks[1] == pytest.approx(1 / (2 * np.pi * (4 / 3 - 1 / 2)), rel=0.02)
     assert peaks[2] == 1.0
 
 

@@ -2,9 +2,9 @@
 
 A pixel of a keyframe is a mean over its square. Where the warp stretches it, the surface appears blurred, and
 bilinear interpolation adds to it, by the position between the samples. Both images are filtered to one
-footprint: that of the filter of §5 at the pixel's velocity, and of the finest structure that keyframes
-reproduce. A stretched pixel is filtered less, or not at all. A difference remains where it is wider than the
-footprint: it is the blur that the delivered frame would have.
+footprint: that which a pixel of a keyframe has in the delivered frame where nothing is stretched. A stretched
+pixel is filtered less, or not at all. A difference remains where it is wider than the footprint: it is the
+blur that the delivered frame would have.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from __future__ import annotations
 import numpy as np
 
 from enfilade.methods.paper.spatial_filter import SIGMAS, reconstruct
+from enfilade.methods.paper.warp import PIXEL_VARIANCE
 from enfilade.records import F32, Halves, Mask, Warped
 
-# Variance along an axis, square pixels: with that of the filter of §5 at rest (1/4), a Gaussian of one pixel.
-# It passes 0.29 at half the Nyquist frequency. Finer structure is aliased and resampled in any keyframe, and
-# differs at any distance of two of them. Chosen in ROOM and ATRIUM without noise, of 0.25 to 1.
-FINEST = 0.75
+# Variance along an axis of a pixel that is interpolated halfway between others: its square's, and the tent's.
+# Added to the filter of §5, so that the positions between the samples make no difference.
+INTERPOLATED = PIXEL_VARIANCE + 1.0 / 4.0
 
 
 def shown_alike(before: Warped, after: Warped, is_compared: Mask, support_px: F32) -> tuple[Halves, Halves]:
@@ -55,7 +55,7 @@ def _shown(warped: Warped, is_compared: Mask, filler: F32, support_px: F32) -> H
 
 def _remaining_support(footprint: F32, support_px: F32) -> F32:
     """Full width of the filter that brings pixels to the common footprint; at least one pixel."""
-    shown = np.square(support_px / np.float32(SIGMAS)) + np.float32(FINEST)
+    shown = np.square(support_px / np.float32(SIGMAS)) + np.float32(INTERPOLATED)
     sigma = np.sqrt(np.maximum(shown - footprint, np.float32(0.0)))
     support: F32 = np.maximum(np.float32(SIGMAS) * sigma, np.float32(1.0))
     return support

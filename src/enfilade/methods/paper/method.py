@@ -40,7 +40,7 @@ class Paper(Method):
     """The published method."""
 
     name = "paper"
-    revision = 8
+    revision = 9
     settings = (
         TraceSettings,
         SamplingSettings,
