@@ -145,3 +145,14 @@ def test_normal_maps_of_directx_have_green_downwards(context, monkeypatch, is_fl
     assert [float(image[..., 1].mean()) for image in written] == pytest.approx(
         [] if green is None else [green]
     )
+
+
+def test_a_glossy_layer_over_refraction_is_glass(context):
+    below = Lobe("refraction", WHITE, "below", Constant((0.0,)), Constant((1.5,)))
+    gloss = Lobe("glossy", Constant((0.5, 0.5, 0.5)), "gloss", Constant((0.0,)))
+    bsdf = build(Mix(Constant((0.5,)), below, gloss, 1.5, "mix"), context).plain()
+    assert bsdf.get("type") == "dielectric"
+    assert bsdf.find("rgb[@name='specular_reflectance']").get("value").split() == ["0.5"] * 3
+    assert noted(context) == []
+    build(below, context)
+    assert noted(context) == ["glass, which also reflects"]

@@ -100,7 +100,7 @@ INPUTS = (
     (
         "Fresnel, Layer Weight below Glossy in a Mix Shader",
         "approximated",
-        "`plastic` without a tint of reflections, `thindielectric` without their roughness, or an even layer",
+        "glass; `plastic` with untinted reflections, `thindielectric` with sharp ones, or an even layer",
     ),
     ("Fresnel, Layer Weight elsewhere", "approximated", "baked as seen along the normal"),
     ("Coordinates and vectors of the camera", "approximated", "baked: the same from all directions"),

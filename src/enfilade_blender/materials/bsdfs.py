@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from enfilade_blender.materials import ggx, mapping
+from enfilade_blender.materials.table import LOBES
 from enfilade_blender.materials.textures import Textures
 from enfilade_blender.materials.values import (
     AttributeValue,
@@ -68,7 +69,10 @@ def lobe_bsdf(lobe: Lobe, context: Context) -> Element:
             bsdf = conductor_bsdf(
                 lobe.colour, lobe.roughness, {}, context, edge=None, is_multiple=lobe.is_multiple
             )
-        case "glass":
+        case "glass" | "refraction":
+            if lobe.kind == "refraction":
+                kind = LOBES["BSDF_REFRACTION"]
+                context.notes.add("approximated", context.owner, lobe.name, kind.note, kind.effect)
             ior = Constant(context.textures.mean(lobe.ior)).number
             bsdf = glass_bsdf(
                 lobe.colour, lobe.colour, lobe.roughness, ior, context, is_multiple=lobe.is_multiple

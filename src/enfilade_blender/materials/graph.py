@@ -206,7 +206,7 @@ class Graph:
             what, effect = "this shader has no counterpart", "its surface is a neutral grey"
             self._notes.add("not-carried", self._owner, f"{node.name} ({node.type})", what, effect)
             return Lobe("diffuse", Constant((0.5, 0.5, 0.5)), node.name)
-        if kind.note:
+        if kind.note and kind.lobe != "refraction":  # below a glossy layer it is glass, without a note
             self._notes.add("approximated", self._owner, node.name, kind.note, kind.effect)
 
         self._note_metal(node)
@@ -311,7 +311,7 @@ def _pane(glass: Shader, node: str) -> Mix | None:
         glass = replace(
             glass.first, ior=Constant((glass.fresnel_ior,))
         )  # below a layer of its own reflection
-    if isinstance(glass, Lobe) and glass.kind == "glass" and _is_smooth(glass.roughness):
+    if isinstance(glass, Lobe) and glass.kind in ("glass", "refraction") and _is_smooth(glass.roughness):
         tint, reflected, ior = glass.colour, glass.colour, glass.ior
     elif isinstance(glass, Principled) and _is_plain_glass(glass):
         # Twice through an interface is once through the colour.

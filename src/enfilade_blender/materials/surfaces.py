@@ -17,6 +17,7 @@ from enfilade_blender.materials.bsdfs import (
     ALMOST,
     Context,
     blended,
+    glass_bsdf,
     is_one,
     is_zero,
     layered,
@@ -283,13 +284,21 @@ def _mix(mix: Mix, context: Context) -> Surface:
 
 
 def _interface(below: Shader, above: Lobe, ior: float, context: Context) -> Surface:
-    """Glossy over a shader by Fresnel's factor: over diffuse it is plastic, over transparent thin glass."""
+    """Glossy over a shader by Fresnel's factor: over diffuse it is plastic, over transparent thin glass.
+
+    Over refraction it is glass.
+    """
     if isinstance(below, Lobe) and below.kind == "diffuse":
         if min(context.textures.mean(above.colour)) < ALMOST:
             what, effect = "the tint of reflections is left out", "reflections have the colour of the light"
             context.notes.add("not-carried", context.owner, above.name, what, effect)
         bsdf = plastic_bsdf(below.colour, above.roughness, ior, context)
         return Surface(with_normal(bsdf, below.normal or above.normal, context))
+    if isinstance(below, Lobe) and below.kind == "refraction":
+        glass = glass_bsdf(
+            below.colour, above.colour, below.roughness, ior, context, is_multiple=below.is_multiple
+        )
+        return Surface(with_normal(glass, below.normal or above.normal, context))
     if above.normal is not None:
         what, effect = "the normals of the glossy layer are left out", "its reflections are even"
         context.notes.add("not-carried", context.owner, above.name, what, effect)

@@ -28,7 +28,7 @@ LOBES = {
     "BSDF_GLOSSY": LobeKind("glossy"),
     "BSDF_METALLIC": LobeKind("glossy", "the edge tint is left out", "metal is darker at grazing angles"),
     "BSDF_GLASS": LobeKind("glass"),
-    "BSDF_REFRACTION": LobeKind("glass", "glass, which also reflects", "the surface has reflections"),
+    "BSDF_REFRACTION": LobeKind("refraction", "glass, which also reflects", "the surface has reflections"),
     "BSDF_TRANSPARENT": LobeKind("transparent"),
     "BSDF_TRANSLUCENT": LobeKind("translucent"),
     "SUBSURFACE_SCATTERING": LobeKind(

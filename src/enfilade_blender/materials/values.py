@@ -197,7 +197,7 @@ class Lobe:
     Attributes
     ----------
     kind : str
-        "diffuse", "glossy", "glass", "transparent" or "translucent".
+        "diffuse", "glossy", "glass", "refraction", "transparent" or "translucent".
     colour
     name : str
         Of the node.
