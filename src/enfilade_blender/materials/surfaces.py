@@ -136,7 +136,7 @@ class Surface:
         textures = context.textures
         values = [v for part in self.emitted for v in (part.colour, *(f.value for f in part.factors))]
         images = [value for value in values if textures.has_pixels(value)]
-        if len(self.emitted) == 1 and images == values and len(values) == 1 and self._is_as_it_is:
+        if images == values and len(values) == 1 and abs(self.emitted[0].strength - 1.0) < 1e-3:
             return textures.colour(images[0])
         place = images[0] if images else None
         total = np.zeros((1, 1, 3), np.float32)
@@ -149,10 +149,6 @@ class Surface:
             return (r, g, b) if max(r, g, b) > 0.0 else None
         name = f"emission {zlib.crc32(total.tobytes()):08x}"
         return textures.rewritten(place, total, name, raw=False, is_exact=bool(total.max() < DIM))
-
-    @property
-    def _is_as_it_is(self) -> bool:
-        return abs(self.emitted[0].strength - 1.0) < 1e-3
 
 
 def _product(part: Radiance, place: ImageValue | Texture | None, context: Context) -> F32:
