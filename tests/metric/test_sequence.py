@@ -105,16 +105,6 @@ def test_the_papers_mode_compares_frames_alone(scene):
         assert found.score == found.steady.score
 
 
-def test_what_is_not_valid_does_not_flicker(metric, scene):
-    valid = np.ones(SHAPE, bool)
-    valid[30:60, 30:60] = False
-    test = np.where(valid, scene, np.float32(np.nan))
-    metric.compare(scene, scene, is_cut=True)
-    assert metric.compare(test, scene, valid=valid).score == 0.0
-    valid[:] = True  # the metric keeps its own copy
-    assert metric.compare(scene + np.float32(5) * np.isnan(test), scene).transient.score == 0.0
-
-
 def bilinear_transient_jnd(metric, period_px, step_px):
     """Transient part of a grating of 4 cd/m2 on 40 that sticks to a surface which moves to the right."""
     reference = np.full(SHAPE, 40.0, np.float32)

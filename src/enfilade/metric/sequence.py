@@ -11,8 +11,8 @@ from enfilade.metric.aqm import Aqm
 from enfilade.metric.comparison import Comparison
 from enfilade.metric.inputs import check_map, check_pair
 from enfilade.metric.pooling import POOLING_EXPONENT
-from enfilade.metric.transient import Error, error_change
-from enfilade.records import F32, Mask
+from enfilade.metric.transient import error_change
+from enfilade.records import F32
 
 
 class SequenceAqm:
@@ -29,7 +29,7 @@ class SequenceAqm:
 
     def __init__(self, aqm: Aqm) -> None:
         self.aqm = aqm
-        self._last: Error | None = None
+        self._last: F32 | None = None
 
     def compare(
         self,
@@ -38,14 +38,13 @@ class SequenceAqm:
         *,
         velocity: F32 | None = None,
         backward_flow_px: F32 | None = None,
-        valid: Mask | None = None,
         is_cut: bool = False,
     ) -> Comparison:
         """Compare the next frame of both sequences.
 
         Parameters
         ----------
-        test, reference, valid
+        test, reference
             As in `Aqm.compare`.
         velocity : (H, W, 2) float32, optional
             Image velocity, deg/s, x to the right and y down. None: from `backward_flow_px`, if that is
@@ -65,24 +64,22 @@ class SequenceAqm:
         Raises
         ------
         InputError
-            As `Aqm.compare`; `backward_flow_px` has the wrong type or shape, or is not finite at a
-            valid pixel.
+            As `Aqm.compare`; `backward_flow_px` has the wrong type or shape, or is not finite.
         """
         viewing = self.aqm.viewing
         shape = viewing.height_px, viewing.width_px
         if backward_flow_px is not None:
-            check_map("backward_flow_px", backward_flow_px, (*shape, 2), valid, is_signed=True)
+            check_map("backward_flow_px", backward_flow_px, (*shape, 2), None, is_signed=True)
             if velocity is None:
                 velocity = viewing.velocity_deg_s(-backward_flow_px)
-        check_pair(shape, test, reference, velocity, valid)
+        check_pair(shape, test, reference, velocity, None)
         change = None
         if self.aqm.has_transient:
-            is_valid = np.ones(shape, dtype=np.bool_) if valid is None else valid.copy()
-            error = np.subtract(test, reference, out=np.zeros_like(test), where=is_valid), is_valid
+            error = test - reference
             if self._last is not None and not is_cut:
                 change = error_change(error, self._last, backward_flow_px)
             self._last = error
-        return self.aqm.compare(test, reference, velocity=velocity, valid=valid, change=change)
+        return self.aqm.compare(test, reference, velocity=velocity, change=change)
 
 
 def sequence_score(frame_scores: Iterable[float]) -> float:

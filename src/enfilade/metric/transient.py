@@ -11,8 +11,6 @@ error on a surface that moves by fractions of a pixel counts a little as change.
 
 from __future__ import annotations
 
-from typing import TypeAlias
-
 import numpy as np
 
 from enfilade.metric.aperture import REFERENCE_AREA_DEG2
@@ -21,9 +19,6 @@ from enfilade.metric.cortex import Band
 from enfilade.records import F32, F64, Mask
 from enfilade.viewing import Viewing
 
-Error: TypeAlias = tuple[F32, Mask]  # test - reference, cd/m2, 0 where not valid; valid pixels
-
-WHOLE = 1.0 - 1e-3  # part of a bilinear sample that must be valid, but for rounding
 FREQUENCIES = 64  # samples of temporal frequency; the integrand is smooth
 LUMINANCE_KNOTS = np.geomspace(1e-3, 1e4, 64)  # cd/m2, interpolated between on logarithmic axes
 
@@ -62,29 +57,25 @@ def moved(image: F32, flow_px: F32) -> tuple[F32, Mask]:
     return np.where(is_inside, upper, np.float32(0.0)), is_inside
 
 
-def error_change(error: Error, before: Error, backward_flow_px: F32 | None) -> F32:
+def error_change(error: F32, before: F32, backward_flow_px: F32 | None) -> F32:
     """Error of a frame less that of the last frame at the same surface.
 
     Parameters
     ----------
-    error, before : (H, W) float32 and (H, W) bool
-        test - reference of this frame and of the last, cd/m2, 0 where not valid; and valid pixels.
+    error, before : (H, W) float32
+        test - reference of this frame and of the last, cd/m2.
     backward_flow_px : (H, W, 2) float32 or None
         From each surface to its place in the last frame, pixels; None: nothing moved.
 
     Returns
     -------
     (H, W) float32
-        cd/m2; 0 where either is not valid or the surface was outside.
+        cd/m2; 0 where the surface was outside.
     """
-    (now, valid), (last, last_valid) = error, before
-    if backward_flow_px is not None:
-        flow = np.where(valid[..., None], backward_flow_px, np.float32(0.0))
-        last, is_inside = moved(last, flow)
-        if not last_valid.all():
-            is_inside &= moved(last_valid.astype(np.float32), flow)[0] > WHOLE
-        last_valid = is_inside
-    return np.where(valid & last_valid, now - last, np.float32(0.0))
+    if backward_flow_px is None:
+        return error - before
+    last, is_inside = moved(before, backward_flow_px)
+    return np.where(is_inside, error - last, np.float32(0.0))
 
 
 def flicker_sensitivity(frequency_cpd: float, fps: float, luminance_cd_m2: F64) -> F64:
