@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from enfilade.arrays import Array3f, Float, UInt, opaque
 from enfilade.camera.pinhole import Camera
-from enfilade.kernels.estimate import estimate
+from enfilade.kernels.estimate import Estimate
 from enfilade.records import Shading, SurfaceClass
 from enfilade.renderer import PixelFilter, RandomKey, Rays, Renderer, SceneDescription, Surfaces
 
@@ -60,15 +60,16 @@ class NoiseFreeRenderer:
 
         All rays through a pixel's centre are identical: one is traced, and the variance is 0.
         """
-        return estimate(
+        estimate = Estimate(
             camera,
             pixels,
             self._radiance,
-            spp=1 if pixel_filter is PixelFilter.CENTRE else spp,
             paths_in_flight=PATHS_IN_FLIGHT,
             pixel_filter=pixel_filter,
             random=random,
         )
+        estimate.add(1 if pixel_filter is PixelFilter.CENTRE else spp)
+        return estimate.shading
 
     def _radiance(self, rays: Rays, _sampler: Any) -> Any:
         # Shade the first surface.

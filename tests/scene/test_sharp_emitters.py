@@ -8,7 +8,7 @@ import pytest
 from enfilade.arrays import Array3f, Float, UInt, rows
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.images import write_exr
-from enfilade.kernels.estimate import Estimate, Samples, estimate
+from enfilade.kernels.estimate import Estimate, Samples
 from enfilade.kernels.random import Discrete, one_sequence
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from enfilade.renderer import PixelFilter, Purpose, RandomKey, Rays
@@ -186,9 +186,11 @@ def test_veiled_light_is_that_of_the_path_tracer(tmp_path, name, veils, integrat
     camera = Camera(look_at((1.5, 2.0, 2.5), (0.0, 0.2, 0.0)), 50.0, 24, 16)
     pixels = np.arange(camera.width * camera.height, dtype=np.uint32)
     key = RandomKey(5, 1, Purpose.DIFFUSE)
-    ours = estimate(
-        camera, pixels, radiance, spp=spp, paths_in_flight=1 << 18, pixel_filter=PixelFilter.BOX, random=key
+    estimate = Estimate(
+        camera, pixels, radiance, paths_in_flight=1 << 18, pixel_filter=PixelFilter.BOX, random=key
     )
+    estimate.add(spp)
+    ours = estimate.shading
     key = RandomKey(6, 1, Purpose.REFERENCE)
     theirs = renderer.trace(camera, pixels, key, spp=spp, pixel_filter=PixelFilter.BOX)
     error = (ours.color - theirs.color) @ [0.2126, 0.7152, 0.0722]

@@ -17,7 +17,7 @@ from drjit.auto import PCG32, UInt64
 
 from enfilade.arrays import Array3f, Float, UInt
 from enfilade.camera.pinhole import Camera
-from enfilade.kernels.estimate import estimate
+from enfilade.kernels.estimate import Estimate
 from enfilade.records import Shading, SurfaceClass
 from enfilade.renderer import PixelFilter, RandomKey, Rays, SceneDescription, Surfaces
 from support.analytic_scene import (
@@ -82,15 +82,16 @@ class AnalyticRenderer:
         pixel_filter: PixelFilter = PixelFilter.CENTRE,
     ) -> Shading:
         """Path trace a list of pixels; see :meth:`enfilade.renderer.Renderer.trace`."""
-        return estimate(
+        estimate = Estimate(
             camera,
             pixels,
             self._noisy,
-            spp=spp,
             paths_in_flight=self._paths_in_flight,
             pixel_filter=pixel_filter,
             random=random,
         )
+        estimate.add(spp)
+        return estimate.shading
 
     def _noisy(self, rays: Rays, sampler: Any) -> Any:
         """Radiance along rays, with noise that is independent from path to path."""

@@ -226,30 +226,6 @@ class Estimate:
         return found
 
 
-def estimate(
-    camera: Camera,
-    pixels: npt.NDArray[np.uint32],
-    radiance: Radiance,
-    *,
-    spp: int,
-    paths_in_flight: int,
-    pixel_filter: PixelFilter,
-    random: RandomKey,
-) -> Shading:
-    """Mean radiance of pixels: an :class:`Estimate` with as many paths for all.
-
-    Returns
-    -------
-    Shading
-        Of shape (N,), over the finite samples of each pixel.
-    """
-    whole = Estimate(
-        camera, pixels, radiance, paths_in_flight=paths_in_flight, pixel_filter=pixel_filter, random=random
-    )
-    whole.add(spp)
-    return whole.shading
-
-
 def _numbered(pixels: npt.NDArray[np.uint32], first: int, count: int) -> tuple[Any, Any, Any]:
     """Index in the list, pixel, and index of each path, UInt: `count` neighbouring lanes a pixel."""
     lane = dr.arange(UInt, len(pixels) * count)

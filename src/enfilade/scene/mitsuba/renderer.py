@@ -19,7 +19,7 @@ import numpy.typing as npt
 from enfilade.arrays import Array3f, Bool, Float, UInt
 from enfilade.camera.pinhole import Camera
 from enfilade.device import active
-from enfilade.kernels.estimate import estimate
+from enfilade.kernels.estimate import Estimate
 from enfilade.kernels.guiding import PathGuide
 from enfilade.kernels.replay import recorded
 from enfilade.records import Shading
@@ -130,16 +130,16 @@ class MitsubaRenderer:
         pixel_filter: PixelFilter = PixelFilter.CENTRE,
     ) -> Shading:
         """Path trace a list of pixels; see :meth:`enfilade.renderer.Renderer.trace`."""
-        radiance, paths_in_flight = self._radiance, self._paths_in_flight
-        return estimate(
+        estimate = Estimate(
             camera,
             pixels,
-            radiance,
-            spp=spp,
-            paths_in_flight=paths_in_flight,
+            self._radiance,
+            paths_in_flight=self._paths_in_flight,
             pixel_filter=pixel_filter,
             random=random,
         )
+        estimate.add(spp)
+        return estimate.shading
 
     def why_inseparable(self) -> str:
         """See :meth:`enfilade.renderer.LobeRenderer.why_inseparable`."""
