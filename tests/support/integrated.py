@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from enfilade.arrays import opaque
 from enfilade.camera.pinhole import Camera
 from enfilade.kernels.estimate import Estimate
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache, upload
@@ -56,7 +57,12 @@ def traced(renderer, camera: Camera, spp: int) -> Shading:
 
 
 def cache_of(*images) -> IrradianceCache:
-    return IrradianceCache.of([upload(*image) for image in images], [1.0] * len(images))
+    return cache_of_uploaded([upload(*image) for image in images])
+
+
+def cache_of_uploaded(images, weights=None, **more) -> IrradianceCache:
+    own = [1.0] * len(images) if weights is None else weights
+    return IrradianceCache(images=tuple(images), weights=tuple(map(opaque, own)), **more)
 
 
 def standard_errors(ours: Shading, reference: Shading, where=slice(None)) -> float:

@@ -18,6 +18,7 @@ from support.integrated import (
     LUMINANCE,
     assert_same_in_batches,
     cache_of,
+    cache_of_uploaded,
     estimated,
     gathered,
     shaded,
@@ -205,7 +206,7 @@ def test_images_of_weight_zero_add_no_surfaces(diffuse):
     finer = find_geometry(renderer, front_camera(width=480, height=360, x=-0.5))
     at = [lanes(values) for values in (positions(finer), finer.normal, finer.shape_index)]
     image = upload(*images[0])
-    alone, filled = IrradianceCache.of([image], [1.0]), IrradianceCache.of([image] * 6, [1.0, *[0.0] * 5])
+    alone, filled = cache_of_uploaded([image]), cache_of_uploaded([image] * 6, [1.0, *[0.0] * 5])
     np.testing.assert_array_equal(np.array(alone.lookup(*at)[1]), np.array(filled.lookup(*at)[1]))
 
 
@@ -214,15 +215,15 @@ def test_the_view_of_a_cache_is_looked_up_like_its_images(diffuse):
     geometry = find_geometry(renderer, front_camera())
     at = [lanes(values) for values in (positions(geometry), geometry.normal, geometry.shape_index)]
     image, other = (upload(*one) for one in images[:2])
-    cache = IrradianceCache.of([other], [1.0], view=image)
+    cache = cache_of_uploaded([other], view=image)
     (found, is_found), (expected, is_expected) = (
         cache.lookup_in_view(*at),
-        IrradianceCache.of([image], [1.0]).lookup(*at),
+        cache_of_uploaded([image]).lookup(*at),
     )
     assert np.array(is_found).mean() > 0.5
     np.testing.assert_array_equal(np.array(is_found), np.array(is_expected))
     np.testing.assert_array_equal(np.array(found), np.array(expected))
-    assert not np.array(IrradianceCache.of([other], [1.0]).lookup_in_view(*at)[1]).any()
+    assert not np.array(cache_of_uploaded([other]).lookup_in_view(*at)[1]).any()
 
 
 def test_other_scenes_may_be_open(tmp_path):

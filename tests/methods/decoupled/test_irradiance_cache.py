@@ -8,9 +8,10 @@ import pytest
 
 from enfilade.arrays import Array3f, UInt, image
 from enfilade.camera.pinhole import Camera, look_at
-from enfilade.methods.decoupled.irradiance_cache import IrradianceCache, accumulate, reproject_to, upload
+from enfilade.methods.decoupled.irradiance_cache import accumulate, reproject_to, upload
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.records import Geometry, Shading
+from support.integrated import cache_of_uploaded
 
 H, W = 16, 24
 SPOT = 8, 12  # row, column of a bright pixel
@@ -61,7 +62,7 @@ def test_points_beyond_the_visible_part_of_a_surface_are_found_up_to_the_least_w
     pixels = np.stack([x, np.full(5, 3.5), np.ones(5)])
     points = geometry.camera.eye[:, None] + geometry.camera.direction_from_pixel @ pixels
     at = Array3f(points.astype(np.float32)), Array3f(0, 0, 1), UInt(1)
-    cache = IrradianceCache.of([uploaded, blank], [1.0, 1.0], view=uploaded, min_coverage=min_coverage)
+    cache = cache_of_uploaded([uploaded, blank], view=uploaded, min_coverage=min_coverage)
     for found, is_found in (cache.lookup(*at), cache.lookup_in_view(*at)):
         assert np.array(is_found).tolist() == [True, True, True, False, False]
         np.testing.assert_allclose(np.array(found)[0], [1, 1, 1, 0, 0], rtol=1e-5)

@@ -64,24 +64,6 @@ class IrradianceCache:
     min_coverage: float = MIN_COVERAGE
     depth_weights: DepthWeights = UNWEIGHTED
 
-    @staticmethod
-    def of(
-        images: Sequence[UploadedImage],
-        weights: Sequence[float],
-        hash_grid: HashGrid | None = None,
-        *,
-        view: UploadedImage | None = None,
-        soft_only: bool = False,
-        path_guide: PathGuide | None = None,
-        min_coverage: float = MIN_COVERAGE,
-        depth_weights: DepthWeights = UNWEIGHTED,
-    ) -> IrradianceCache:
-        """A cache of some images with their weights."""
-        own = tuple(opaque(float(weight)) for weight in weights)
-        return IrradianceCache(
-            view, tuple(images), own, hash_grid, soft_only, path_guide, min_coverage, depth_weights
-        )
-
     def lookup_in_view(self, position: Any, normal: Any, shape_index: Any) -> tuple[Any, Any]:
         """The same as :meth:`lookup`, from the image in the view of the camera."""
         if self.view is None:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from enfilade.arrays import opaque
 from enfilade.cache import LruCache
 from enfilade.camera.path import CameraPath, Segment
 from enfilade.camera.pinhole import Camera
@@ -179,10 +180,11 @@ class ShotContext:
         """The accumulated prepass images near a frame; a fixed number, so that one kernel serves all."""
         near = nearest(self.walk.path, self.keyframes, frame, PREPASS_IMAGES)
         images = [self.images.accumulated_prepass(keyframe) for keyframe in near]
-        filled_up = self._filled_up(images, [1.0] * len(images), PREPASS_IMAGES)
-        return IrradianceCache.of(
-            *filled_up,
+        filled_up, weights = self._filled_up(images, [1.0] * len(images), PREPASS_IMAGES)
+        return IrradianceCache(
             view=images[0],
+            images=filled_up,
+            weights=weights,
             path_guide=self._path_guide(near[0]),
             min_coverage=PREPASS_COVERAGE,
             depth_weights=self._prepass_weights,
@@ -211,11 +213,13 @@ class ShotContext:
         weights = self._keyframe_weights(frame) | self._disocclusion_weights(frame)
         images, own = [self.images.accumulated(f) for f in weights], list(weights.values())
         reprojected = reproject_to(self.walk.view(frame).geometry, images, own)
-        filled_up = self._filled_up(images, own, self.settings.lookup_keyframes + DISOCCLUSION_IMAGES)
-        return IrradianceCache.of(
-            *filled_up,
-            self.hash_grid(frame),
+        count = self.settings.lookup_keyframes + DISOCCLUSION_IMAGES
+        filled_up, opaque_weights = self._filled_up(images, own, count)
+        return IrradianceCache(
             view=reprojected,
+            images=filled_up,
+            weights=opaque_weights,
+            hash_grid=self.hash_grid(frame),
             soft_only=self.renderer.has_sharp_light(),
             path_guide=self._path_guide(*nearest(self.walk.path, self.keyframes, frame, 1)),
             depth_weights=self._depth_weights,
@@ -247,12 +251,13 @@ class ShotContext:
 
     def _filled_up(
         self, images: list[UploadedImage], weights: list[float], count: int
-    ) -> tuple[list[UploadedImage], list[float]]:
-        """Images and weights with blank ones up to a number, so that one kernel serves all frames."""
+    ) -> tuple[tuple[UploadedImage, ...], tuple[Any, ...]]:
+        """Images and weights (Float) with blank ones up to a number, so that one kernel serves all frames."""
         missing = count - len(images)
         while len(self._blank) < missing:
             self._blank.append(blank_image())
-        return [*images, *self._blank[:missing]], [*weights, *[0.0] * missing]
+        filled_up = *images, *self._blank[:missing]
+        return filled_up, tuple(map(opaque, [*weights, *[0.0] * missing]))
 
     def uncovered(self, frame: int, others: Mapping[int, UploadedImage]) -> Mask:
         """Diffuse pixels of a frame that neither the nearest keyframes nor other images show.
