@@ -191,5 +191,3 @@ def test_wrong_settings_are_refused_by_name(viewing):
     for metric in (Aqm.paper, HalvesAqm):
         with pytest.raises(InputError, match="mask_slope"):
             metric(viewing, mask_slope=1.5)
-    with pytest.raises(InputError, match="workers"):
-        HalvesAqm(viewing, workers=0)

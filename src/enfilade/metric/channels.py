@@ -45,17 +45,12 @@ class ChannelBank:
     ----------
     viewing : Viewing
         Size of the images, and pixels per degree.
-    tilt, oversampling, workers
+    tilt, oversampling
         As in `CortexTransform`.
     """
 
     def __init__(
-        self,
-        viewing: Viewing,
-        *,
-        tilt: Tilt | None = None,
-        oversampling: float = OVERSAMPLING,
-        workers: int = 1,
+        self, viewing: Viewing, *, tilt: Tilt | None = None, oversampling: float = OVERSAMPLING
     ) -> None:
         density = viewing.pixels_per_degree
         self.image_shape = viewing.height_px, viewing.width_px
@@ -65,12 +60,7 @@ class ChannelBank:
             _mirrored_indices(length, self._margin_px, 2 * base.reduction) for length in self.image_shape
         )
         self.cortex = CortexTransform(
-            len(self._rows),
-            len(self._columns),
-            density,
-            tilt=tilt,
-            oversampling=oversampling,
-            workers=workers,
+            len(self._rows), len(self._columns), density, tilt=tilt, oversampling=oversampling
         )
         self.bands = self.cortex.bands
 

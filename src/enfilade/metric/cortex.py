@@ -15,7 +15,6 @@ import numpy as np
 import numpy.typing as npt
 import scipy.fft
 
-from enfilade.errors import InputError
 from enfilade.records import F32
 
 Complex64: TypeAlias = npt.NDArray[np.complex64]
@@ -162,8 +161,6 @@ class CortexTransform:
         (rho, band, base band) -> further weight of every frequency of a band.
     oversampling : float
         Of the bands, see `bands`.
-    workers : int
-        Threads of the FFT, 1 or more.
     """
 
     def __init__(
@@ -174,13 +171,9 @@ class CortexTransform:
         *,
         tilt: Tilt | None = None,
         oversampling: float = OVERSAMPLING,
-        workers: int = 1,
     ) -> None:
-        if workers < 1:
-            raise InputError(f"metric: workers is {workers!r}; give 1 or more threads")
         self.height_px, self.width_px = height_px, width_px
         self.bands = bands(pixels_per_degree, oversampling)
-        self._workers = workers
         down = np.fft.fftfreq(height_px).astype(np.float32)[:, None]
         across = np.fft.rfftfreq(width_px).astype(np.float32)[None, :]
         rho = np.hypot(across, down)
@@ -204,7 +197,7 @@ class CortexTransform:
 
     def spectra(self, images: F32) -> Complex64:
         """Spectra of images, (n, height, width) float32 -> (n, height, width/2 + 1) complex64."""
-        return scipy.fft.rfft2(images, workers=self._workers)
+        return scipy.fft.rfft2(images)
 
     def ring(self, spectra: Complex64, band: Band) -> Complex64:
         """The part of the spectra in a band, cropped to the band's reduced size."""
@@ -225,12 +218,11 @@ class CortexTransform:
         (n, height / reduction, width / reduction) float32
             Response, in the units of the images.
         """
-        width, workers = self.reduced_shape(band)[1], self._workers
         if orientation is not None:
             ring = ring * self._crop(self._fans[orientation], band)
         # Columns beyond the cut-off are zero, and the transform down them is saved.
-        columns = scipy.fft.ifft(ring, axis=-2, overwrite_x=orientation is not None, workers=workers)
-        return scipy.fft.irfft(columns, n=width, axis=-1, workers=workers)
+        columns = scipy.fft.ifft(ring, axis=-2, overwrite_x=orientation is not None)
+        return scipy.fft.irfft(columns, n=self.reduced_shape(band)[1], axis=-1)
 
     def reduced_shape(self, band: Band) -> tuple[int, int]:
         """Height and width of a band's channels."""

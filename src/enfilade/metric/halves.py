@@ -51,15 +51,13 @@ class HalvesAqm:
     ----------
     viewing, mask_slope
         As in `Aqm.paper`.
-    workers
-        Threads of the FFT, 1 or more.
     """
 
-    def __init__(self, viewing: Viewing, *, mask_slope: float = MASK_SLOPE, workers: int = 1) -> None:
+    def __init__(self, viewing: Viewing, *, mask_slope: float = MASK_SLOPE) -> None:
         check_mask_slope(mask_slope)
         self.viewing = viewing
         self._mask_slope = mask_slope
-        self._bank = ChannelBank(viewing, workers=workers)
+        self._bank = ChannelBank(viewing)
         gain = 10.0 ** (GAIN_DB / 20.0)
         self._table = SensitivityTable(
             lambda rho, velocity, _: gain * spatiovelocity_sensitivity(rho, velocity),

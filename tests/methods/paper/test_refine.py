@@ -6,9 +6,9 @@ from functools import cache
 import drjit as dr
 import numpy as np
 import pytest
+import scipy.fft
 
 from enfilade.camera.path import Segment
-from enfilade.methods.paper import refine
 from enfilade.methods.paper.keyframe import trace_keyframe
 from enfilade.methods.paper.method import Paper
 from enfilade.methods.paper.refine import Refinement, SegmentResult, leaf_of
@@ -113,11 +113,18 @@ def test_the_metric_judges_masks_of_specular_shapes_and_then_the_rest(monkeypatc
 
 
 def test_no_more_threads_than_dr_jit_has(monkeypatch):
-    walk, threads = walk_of(room_path(3, SIZE), PlantedWall("none", noise=0.0)), []
-    monkeypatch.setattr(refine, "HalvesAqm", lambda *_, workers, **__: threads.append(workers))
+    compare, threads = HalvesAqm.compare_each, []
+    monkeypatch.setattr(
+        HalvesAqm,
+        "compare_each",
+        lambda *of, **more: threads.append(scipy.fft.get_workers()) or compare(*of, **more),
+    )
+    walk = walk_of(planted_path(), PlantedWall("none", noise=0.0), viewing={"diagonal_m": 0.05})
     for count in (1, 4):
         dr.set_thread_count(count)
-        Refinement(walk)
+        Refinement(walk).compare(
+            Segment(0, 2), lambda frame: Keyframe(walk.view(frame).geometry, trace_keyframe(walk, frame))
+        )
     assert threads == [1, 2]
 
 

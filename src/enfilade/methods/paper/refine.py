@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
+import scipy.fft
 
 from enfilade.camera.path import Segment
 from enfilade.gbuffer import View
@@ -97,8 +98,7 @@ class Refinement:
 
     def __init__(self, walk: Walkthrough) -> None:
         self._walk = walk
-        slope = walk.settings[MetricSettings].mask_slope
-        self._metric = HalvesAqm(walk.viewing, mask_slope=slope, workers=min(FFT_THREADS, dr.thread_count()))
+        self._metric = HalvesAqm(walk.viewing, mask_slope=walk.settings[MetricSettings].mask_slope)
 
     def refine(self, initial: Segment, keyframe: Callable[[int], Keyframe]) -> list[SegmentResult]:
         """Compare a segment, and its halves where it is split.
@@ -171,7 +171,8 @@ class Refinement:
             LuminanceHalves(walk.display_luminance(one.first), walk.display_luminance(one.second))
             for one in shown_alike(*warped, is_compared, support)
         ]
-        found = self._metric.compare_each(
-            *images, pursuits=pursuits, velocity=view.velocity_deg_s, valid=is_compared
-        )
+        with scipy.fft.set_workers(min(FFT_THREADS, dr.thread_count())):
+            found = self._metric.compare_each(
+                *images, pursuits=pursuits, velocity=view.velocity_deg_s, valid=is_compared
+            )
         return [one.jnd for one in found]
