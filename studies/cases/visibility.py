@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from enfilade.kernels.tone import display_luminance
-from enfilade.metric import Aqm, HalvesAqm, LuminanceHalves
+from enfilade.metric import Aqm, HalvesAqm, LuminanceHalves, Pursuit
 from enfilade.metric.pooling import POOLING_EXPONENT
 from enfilade.records import F32, Mask
 from enfilade.settings import MetricSettings, Settings, ViewingSettings
@@ -77,7 +77,10 @@ class Viewer:
     ) -> F32:
         """JND map of what two halves with independent noise share, as in a run; the arguments of `paper`."""
         images = [LuminanceHalves(*map(self.luminance, of)) for of in (test, reference)]
-        return self._halves.compare(*images, velocity=velocity_deg_s, valid=valid).jnd
+        (found,) = self._halves.compare_each(
+            *images, pursuits=[Pursuit.BOTH], velocity=velocity_deg_s, valid=valid
+        )
+        return found.jnd
 
     def modern(self, test: F32, reference: F32, velocity_deg_s: F32 | None) -> F32:
         """JND map by the modern mode, of single frames (no flicker)."""

@@ -19,6 +19,11 @@ def halves(image, deviation, seed):
     return LuminanceHalves(*noisy)
 
 
+def compared(aqm, test, reference, pursuit=Pursuit.BOTH, **more):
+    (found,) = aqm.compare_each(test, reference, pursuits=[pursuit], **more)
+    return found
+
+
 def darker_patch(image):
     changed = image.copy()
     changed[30:90, 40:110] *= 0.7
@@ -27,22 +32,22 @@ def darker_patch(image):
 
 def test_equal_halves_are_equal(aqm, textured):
     one = LuminanceHalves(textured, textured)
-    found = aqm.compare(one, one)
+    found = compared(aqm, one, one)
     assert found.score == found.jnd.max() == 0.0
 
 
 def test_noise_is_no_difference(aqm, textured):
-    found = aqm.compare(halves(textured, 8.0, 1), halves(textured, 8.0, 2))
+    found = compared(aqm, halves(textured, 8.0, 1), halves(textured, 8.0, 2))
     assert found.percent_visible < 3.0
-    clean = LuminanceHalves(textured, darker_patch(textured))
-    assert aqm.compare(clean, LuminanceHalves(textured, textured)).percent_visible == 0.0  # in one half alone
+    in_one_half = LuminanceHalves(textured, darker_patch(textured))
+    assert compared(aqm, in_one_half, LuminanceHalves(textured, textured)).percent_visible == 0.0
 
 
 @pytest.mark.parametrize("deviation", [1.0, 4.0])
 def test_a_difference_is_as_visible_with_noise_as_without(aqm, textured, deviation):
     changed = darker_patch(textured)
-    clean = aqm.compare(LuminanceHalves(changed, changed), LuminanceHalves(textured, textured))
-    noisy = aqm.compare(halves(changed, deviation, 1), halves(textured, deviation, 2))
+    clean = compared(aqm, LuminanceHalves(changed, changed), LuminanceHalves(textured, textured))
+    noisy = compared(aqm, halves(changed, deviation, 1), halves(textured, deviation, 2))
     assert clean.percent_visible > 20.0
     assert noisy.percent_visible == pytest.approx(clean.percent_visible, abs=6.0)
 
@@ -55,7 +60,7 @@ def test_gain_of_a_grating(aqm, viewing):
     background = np.full((128, 160), 30.0, np.float32)
     contrast = 0.002
     grating = (30.0 * (1.0 + contrast * np.cos(2 * np.pi * frequency * x))).astype(np.float32)
-    found = aqm.compare(LuminanceHalves(grating, grating), LuminanceHalves(background, background))
+    found = compared(aqm, LuminanceHalves(grating, grating), LuminanceHalves(background, background))
     sensitivity = 245.4 * 10.0 ** (GAIN_DB / 20.0)  # Eq. 4 at 4.9 cpd, 0.15 deg/s
     assert found.jnd[64, 80] == pytest.approx(contrast * sensitivity / np.sqrt(2.0), rel=0.1)
 
@@ -67,7 +72,7 @@ def test_a_pan_blurs_bars_across_it(aqm):
     velocity[..., 0] = 20.0
     one, other = (LuminanceHalves(i, i) for i in (bars, faint))
     still, panned = (
-        aqm.compare(other, one, velocity=v, pursuit=Pursuit.NONE).score for v in (None, velocity)
+        compared(aqm, other, one, velocity=v, pursuit=Pursuit.NONE).score for v in (None, velocity)
     )
     assert panned < 0.1 * still
 
@@ -77,7 +82,7 @@ def test_several_eye_movements_are_compared_at_once(aqm, textured):
     one, other = (LuminanceHalves(i, i) for i in (textured, darker_patch(textured)))
     found = aqm.compare_each(other, one, pursuits=list(Pursuit), velocity=velocity)
     for pursuit, each in zip(Pursuit, found, strict=True):
-        alone = aqm.compare(other, one, velocity=velocity, pursuit=pursuit)
+        alone = compared(aqm, other, one, velocity=velocity, pursuit=pursuit)
         assert alone.score == each.score > 0.0
         assert alone.jnd.tobytes() == each.jnd.tobytes()
 
@@ -86,7 +91,7 @@ def test_masked_pixels_do_not_count(aqm, textured):
     valid = np.ones(textured.shape, bool)
     valid[30:90, 40:110] = False
     one, other = (LuminanceHalves(i, i) for i in (textured, darker_patch(textured)))
-    found = aqm.compare(other, one, valid=valid)
+    found = compared(aqm, other, one, valid=valid)
     assert found.jnd.max() == 0.0
 
 
@@ -97,6 +102,6 @@ def test_a_uniform_difference_stands_still_wherever_the_image_moves(aqm):
     velocity[:, 100:, 0] = 20.0
     reference, test = (LuminanceHalves(image, image) for image in (background, brighter))
     still, moving = (
-        aqm.compare(test, reference, velocity=v, pursuit=Pursuit.NONE).jnd for v in (None, velocity)
+        compared(aqm, test, reference, velocity=v, pursuit=Pursuit.NONE).jnd for v in (None, velocity)
     )
     np.testing.assert_allclose(moving, still, rtol=0.05)

@@ -66,19 +66,6 @@ class HalvesAqm:
         )
         self._aperture = Aperture(self._bank.image_shape, viewing.pixels_per_degree, APERTURE_SIGMA_DEG)
 
-    def compare(
-        self,
-        test: LuminanceHalves,
-        reference: LuminanceHalves,
-        *,
-        velocity: F32 | None = None,
-        valid: Mask | None = None,
-        pursuit: Pursuit = Pursuit.BOTH,
-    ) -> Comparison:
-        """Predict the visible differences of two images; see `compare_each`."""
-        (found,) = self.compare_each(test, reference, pursuits=[pursuit], velocity=velocity, valid=valid)
-        return found
-
     def compare_each(
         self,
         test: LuminanceHalves,
