@@ -1,17 +1,21 @@
 """Light behind glass in scenes that limit the length of paths, against path tracing."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from enfilade.arrays import UInt
-from enfilade.camera.path import CameraPath
+from enfilade.camera.path import CameraPath, Segment
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry
 from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.methods.decoupled import Decoupled
 from enfilade.methods.decoupled.path_depth import DepthWeights, light_by_depth, weight_after
+from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
+from enfilade.settings import Settings
 from support.in_memory import run_passes, walk_of
 
 SIZE = 64, 48
@@ -91,13 +95,20 @@ def test_without_limit_nothing_is_weighted(tmp_path):
 
 def test_weights_are_relative_to_the_depth_at_which_cached_paths_begin():
     light = [[8.0, 6.0, 4.0, 2.0, 2.0], [8.0, 6.0, 4.0, 2.0, 2.0]]  # of two keyframes; the last is sharp
-    weights, prepass = DepthWeights.of(light), DepthWeights.of_prepass(light)
+    weights = DepthWeights.of(light)
     bounces = UInt([0, 1, 2, 3, 7])
     others = [10 / 8, 1, 6 / 8, 4 / 8, 4 / 8]
     found = weight_after(weights.images, bounces)
     np.testing.assert_allclose(np.array(found), [1, 6 / 8, 4 / 8, 2 / 8, 2 / 8])
-    for of in (weights.others, prepass.images, prepass.others):
-        np.testing.assert_allclose(np.array(weight_after(of, bounces)), others)
+    np.testing.assert_allclose(np.array(weight_after(weights.others, bounces)), others)
+
+
+def test_prepass_images_are_weighted_as_other_irradiance(monkeypatch):
+    walk = SimpleNamespace(path=PATH, settings=Settings())
+    shot = ShotContext(0, [Segment(0, len(PATH) - 1)], None, walk, None, None)
+    weights = DepthWeights.of([[8.0, 6.0, 4.0, 2.0, 2.0]])
+    monkeypatch.setattr(ShotContext, "_depth_weights", weights)
+    assert shot._prepass_weights.images is shot._prepass_weights.others is weights.others
 
 
 def test_without_light_nothing_is_left_out():

@@ -54,16 +54,9 @@ class DepthWeights:
         """
         if not light:
             return UNWEIGHTED
-        soft, whole = _soft_and_whole(light)
-        return DepthWeights(_relative(soft, 0), _relative(whole, 1))
-
-    @staticmethod
-    def of_prepass(light: Sequence[Sequence[float]]) -> DepthWeights:
-        """The same for prepass images, which are as all other irradiance."""
-        if not light:
-            return UNWEIGHTED
-        _, whole = _soft_and_whole(light)
-        return DepthWeights(_relative(whole, 1), _relative(whole, 1))
+        total = np.sum(light, axis=0)
+        soft, sharp = total[:-1], total[-1]
+        return DepthWeights(_relative(soft, 0), _relative(soft + sharp, 1))
 
 
 UNWEIGHTED = DepthWeights()
@@ -135,12 +128,6 @@ def light_by_depth(
     means = [float(np.mean(of.color @ REC709_LUMINANCE, dtype=np.float64)) for of in estimate.shadings]
     count = RayCount(estimate.count.rays * len(DEPTHS), estimate.count.dropped)
     return [mean * len(pixels) for mean in means], count
-
-
-def _soft_and_whole(light: Sequence[Sequence[float]]) -> tuple[Any, Any]:
-    """Irradiance by depth, (MAX_PATH_DEPTH,), without sharp light and with it."""
-    *soft, sharp = np.sum(light, axis=0)
-    return np.array(soft), np.array(soft) + sharp
 
 
 def _relative(light: Any, depth: int) -> Any:

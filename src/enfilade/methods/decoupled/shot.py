@@ -233,14 +233,14 @@ class ShotContext:
 
     @cached_property
     def _depth_weights(self) -> DepthWeights:
-        return DepthWeights.of(self._light_by_depth())
+        return DepthWeights.of(
+            [self.inputs.metadata("prepass", k)["light_by_depth"] for k in self.depth_keyframes]
+        )
 
-    @cached_property
+    @property
     def _prepass_weights(self) -> DepthWeights:
-        return DepthWeights.of_prepass(self._light_by_depth())
-
-    def _light_by_depth(self) -> list[list[float]]:
-        return [self.inputs.metadata("prepass", k)["light_by_depth"] for k in self.depth_keyframes]
+        """Prepass images are as all other irradiance."""
+        return replace(self._depth_weights, images=self._depth_weights.others)
 
     def _path_guide(self, keyframe: int) -> PathGuide | None:
         def make() -> PathGuide | None:
