@@ -56,7 +56,8 @@ def test_light_behind_glass_is_that_of_paths_of_limited_depth(tmp_path, max_dept
 
 def light_of(renderer):
     geometry, key = find_geometry(renderer, CAMERAS[MIDDLE]), RandomKey(1, MIDDLE, Purpose.DEPTHS)
-    light, count = light_by_depth(renderer, geometry, None, key, paths_in_flight=1 << 18)
+    shot = ShotContext(0, [Segment(0, len(PATH) - 1)], None, walk_of(PATH, renderer), None, None)
+    light, count = light_by_depth(renderer, geometry, None, key, shot.estimate)
     assert count.rays == 4 * geometry.has_diffuse.sum()
     return np.array(light) / geometry.has_diffuse.sum()
 

@@ -7,7 +7,7 @@ early, says how much of the light remains.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +19,7 @@ from enfilade.kernels.estimate import Estimate, RayCount, Samples
 from enfilade.kernels.guiding import PathGuide
 from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.records import Geometry
-from enfilade.renderer import MAX_PATH_DEPTH, LobeRenderer, PixelFilter, RandomKey
+from enfilade.renderer import MAX_PATH_DEPTH, LobeRenderer, RandomKey
 
 PIXELS = 4096  # of a keyframe, from which paths end early
 KEYFRAMES = 2  # of a shot, or one more
@@ -74,8 +74,7 @@ def light_by_depth(
     geometry: Geometry,
     guide: PathGuide | None,
     random: RandomKey,
-    *,
-    paths_in_flight: int,
+    make_estimate: Callable[..., Estimate],
 ) -> tuple[list[float], RayCount]:
     """Mean luminance of irradiance over pi, by the same paths ended as if they began at each depth.
 
@@ -86,7 +85,8 @@ def light_by_depth(
         G-buffer of a keyframe.
     guide
     random
-    paths_in_flight
+    make_estimate
+        Makes an estimate of pixels: :meth:`ShotContext.estimate`.
 
     Returns
     -------
@@ -95,8 +95,9 @@ def light_by_depth(
         the number of pixels with a diffuse lobe.
     count : RayCount
     """
-    pixels = np.flatnonzero(geometry.has_diffuse).astype(np.uint32)
-    chosen = pixels[np.linspace(0, len(pixels) - 1, min(len(pixels), PIXELS)).astype(np.intp)]
+    pixels = np.flatnonzero(geometry.has_diffuse)
+    chosen = np.zeros_like(geometry.has_diffuse)
+    chosen.flat[pixels[np.linspace(0, len(pixels) - 1, min(len(pixels), PIXELS)).astype(np.intp)]] = True
     has_sharp_light = renderer.has_sharp_light()
 
     def radiance(rays: Any, sampler: Any) -> Samples:
@@ -113,16 +114,8 @@ def light_by_depth(
         sharp = renderer.sharp_light(point, sampler.copy())[0] if has_sharp_light else Array3f(0)
         return Samples((*soft, sharp + dr.zeros(Array3f, dr.width(sampler.seed))))
 
-    estimate = Estimate(
-        geometry.camera,
-        chosen,
-        radiance,
-        paths_in_flight=paths_in_flight,
-        pixel_filter=PixelFilter.CENTRE,
-        random=random,
-        layers=len(DEPTHS) + 1,
-    )
-    if not len(chosen):
+    estimate = make_estimate(geometry.camera, chosen, radiance, random, layers=len(DEPTHS) + 1)
+    if not len(pixels):
         return [0.0] * (len(DEPTHS) + 1), estimate.count
     estimate.add(1)
     means = [float(np.mean(of.color @ REC709_LUMINANCE, dtype=np.float64)) for of in estimate.shadings]

@@ -14,7 +14,6 @@ from enfilade.methods.decoupled.path_depth import light_by_depth
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.renderer import Purpose
-from enfilade.settings import LimitSettings
 
 SPP = 2
 OUTLIER = 16.0  # times the denoised irradiance: brighter estimates are limited where the mean is kept
@@ -42,11 +41,7 @@ def trace_prepass(shot: ShotContext, frame: int) -> Output:
     by_depth, ended = None, RayCount()
     if frame in shot.depth_keyframes:
         by_depth, ended = light_by_depth(
-            renderer,
-            geometry,
-            guide,
-            walk.random(frame, Purpose.DEPTHS),
-            paths_in_flight=walk.settings[LimitSettings].paths_in_flight,
+            renderer, geometry, guide, walk.random(frame, Purpose.DEPTHS), shot.estimate
         )
     direct, indirect = (shading.to_image(where) for shading in estimate.shadings)
     image = IrradianceImage(direct, indirect, where)
