@@ -58,31 +58,24 @@ class Viewing:
 
     def __post_init__(self) -> None:
         for name in ("width_px", "height_px"):
-            pixels = getattr(self, name)
-            if not isinstance(pixels, (int, np.integer)) or pixels < 1:
-                msg = f"viewing: {name} is {pixels!r}; give a whole number of pixels, 1 or more"
-                raise InputError(msg)
+            if not isinstance(pixels := getattr(self, name), (int, np.integer)) or pixels < 1:
+                raise InputError(f"viewing: {name} is {pixels!r}; give a whole number of pixels, 1 or more")
         for name in ("diagonal_m", "distance_m", "fps", "peak_cd_m2"):
-            number = getattr(self, name)
-            if not (math.isfinite(number) and number > 0):
-                msg = f"viewing: {name} is {number!r}; give a finite number above 0"
-                raise InputError(msg)
+            if not 0 < (number := getattr(self, name)) < math.inf:
+                raise InputError(f"viewing: {name} is {number!r}; give a finite number above 0")
         if not 0 <= self.persistence <= 1:
-            msg = f"viewing: persistence is {self.persistence!r}; give a share from 0 to 1"
-            raise InputError(msg)
+            raise InputError(f"viewing: persistence is {self.persistence!r}; give a share from 0 to 1")
         if not 0 <= self.black_cd_m2 < self.peak_cd_m2:
-            msg = (
+            raise InputError(
                 f"viewing: black_cd_m2 is {self.black_cd_m2!r}; "
                 f"give 0 or more, and less than peak_cd_m2 ({self.peak_cd_m2!r})"
             )
-            raise InputError(msg)
         if self.pixels_per_degree > MAX_PIXELS_PER_DEGREE:
-            msg = (
+            raise InputError(
                 f"viewing: distance_m = {self.distance_m:g} and diagonal_m = {self.diagonal_m:g} show "
                 f"{self.pixels_per_degree:.0f} pixels in a degree, more than {MAX_PIXELS_PER_DEGREE:.0f}; "
                 "both are in metres"
             )
-            raise InputError(msg)
 
     @property
     def pixel_pitch_m(self) -> float:
