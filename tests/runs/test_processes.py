@@ -47,6 +47,10 @@ def result_of(executor, slot, task):
     return ended[0].result
 
 
+def pids_of(executor):
+    return [child.process.pid for child in executor._children.values()]
+
+
 def test_crashes_change_nothing(tmp_path, whole):
     order(tmp_path, light_1="kill", light_2="exit", mean_1="raise", frames_2="leave")
     monitor = Recorder()
@@ -67,7 +71,7 @@ def test_workers_that_hang_or_are_stopped_are_killed(tmp_path, opened):
     with opened(2, task_timeout_s=0.2) as executor:
         for slot in (0, 1):
             executor.begin(slot, Order(LIGHT[slot]))
-        pids, ended = executor.pids, []
+        pids, ended = pids_of(executor), []
         while len(ended) < 2:
             ended += executor.wait(None)
         wait_for(lambda: not any(is_alive(pid) for pid in pids))
@@ -97,11 +101,11 @@ def test_a_worker_is_kept_until_it_fails_or_dies(tmp_path, opened, monkeypatch):
     order(tmp_path, light_3="kill", light_4="full")
     with opened() as executor:
         assert result_of(executor, 0, LIGHT[0])["frame"] == 1
-        first = executor.pids
+        first = pids_of(executor)
         os.kill(first[0], signal.SIGKILL)  # while it is free
         executor._children[0].process.join()
         assert result_of(executor, 0, LIGHT[1])["frame"] == 2
-        second = executor.pids
+        second = pids_of(executor)
         assert first != second
         monkeypatch.setattr("enfilade.runs.processes.oom_kills", iter(range(9)).__next__)
         failure = result_of(executor, 0, LIGHT[2])
@@ -110,11 +114,11 @@ def test_a_worker_is_kept_until_it_fails_or_dies(tmp_path, opened, monkeypatch):
         failure = result_of(executor, 0, LIGHT[3])
         assert isinstance(failure.error, NoSpaceError)
         assert "NoSpaceError: no room" in failure.log
-        third = executor.pids
+        third = pids_of(executor)
         executor.discard(0)
         wait_for(lambda: not is_alive(third[0]))
         executor.discard(0)
-        assert executor.pids == []
+        assert pids_of(executor) == []
 
 
 def test_each_worker_sees_a_gpu_of_its_own(tmp_path, opened):

@@ -83,11 +83,6 @@ class Processes:
         self._children: dict[int, _Child] = {}
         self.slots = workers
 
-    @property
-    def pids(self) -> list[int]:
-        """Process numbers of the workers."""
-        return [child.process.pid or 0 for child in self._children.values()]
-
     def begin(self, slot: int, order: Order) -> None:
         """Send a task to a worker."""
         child = self._children.get(slot)
