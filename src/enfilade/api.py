@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from enfilade.device import Choice, activate
-from enfilade.monitor import Monitor, Silence
+from enfilade.monitor import SILENCE, Monitor
 
 if TYPE_CHECKING:
     from enfilade.camera import CameraPath
@@ -32,7 +32,7 @@ def render(
     device: Choice = "auto",
     executor: str = "in-process",
     workers: int | None = None,
-    monitor: Monitor | None = None,
+    monitor: Monitor = SILENCE,
 ) -> dict[str, Any]:
     """Render a walkthrough into a run folder, or go on with one.
 
@@ -84,7 +84,6 @@ def render(
     from enfilade.runs.render import render as render_job
     from enfilade.runs.source import job_of
 
-    monitor = monitor or Silence()
     job = job_of(scene, path, settings or {}, name_of(method), Path(out), monitor)
     return render_job(job, Path(out), monitor, Workers(executor, workers))
 
@@ -96,7 +95,7 @@ def plan(
     method: str | type[Method] = "decoupled",
     settings: Settings | Tables | None = None,
     device: Choice = "auto",
-    monitor: Monitor | None = None,
+    monitor: Monitor = SILENCE,
 ) -> Plan:
     """Analyze every frame of a path, place the initial keyframes, and forecast the cost of rendering.
 
@@ -117,7 +116,6 @@ def plan(
     from enfilade.runs.plan import plan as plan_job
     from enfilade.runs.source import job_of
 
-    monitor = monitor or Silence()
     with scratch_folder("enfilade-plan") as run:
         job = job_of(scene, path, settings or {}, name_of(method), run, monitor)
         return plan_job(job, monitor)
@@ -130,7 +128,7 @@ def import_scene(
     settings: Tables | None = None,
     size: tuple[int, int] | None = None,
     frames: tuple[int, int] | None = None,
-    monitor: Monitor | None = None,
+    monitor: Monitor = SILENCE,
 ) -> ImportedScene:
     """Import a file by Blender, in a process of its own, as a scene folder for :func:`render`.
 
@@ -174,7 +172,7 @@ def import_scene(
         Path(out),
         choices_of(blender, size, frames),
         chosen[LimitSettings],
-        monitor or Silence(),
+        monitor,
         program=blender.program,
         is_strict=blender.strict,
     )
@@ -185,7 +183,7 @@ def compare(
     reference: File,
     *,
     second_reference: File | None = None,
-    monitor: Monitor | None = None,
+    monitor: Monitor = SILENCE,
     **options: Any,
 ) -> SequenceDifference:
     """Measure the visible difference between two image sequences, videos or run folders.
@@ -216,7 +214,7 @@ def compare(
     from enfilade.comparison import compare as compare_sequences
 
     chosen = CompareOptions(**options)
-    return compare_sequences(test, reference, chosen, monitor or Silence(), second_reference=second_reference)
+    return compare_sequences(test, reference, chosen, monitor, second_reference=second_reference)
 
 
 def report(

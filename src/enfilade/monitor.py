@@ -25,3 +25,6 @@ class Silence:
 
     def message(self, text: str) -> None:
         """Show nothing."""
+
+
+SILENCE = Silence()

@@ -19,7 +19,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from enfilade.monitor import Monitor, Silence
+from enfilade.monitor import SILENCE, Monitor
 
 LINE_EVERY_S = 5.0  # at most one line of progress of a stage in this time
 PACE_S = 3600.0  # over which a bar estimates its pace: a task may take many minutes
@@ -141,7 +141,7 @@ def watch(*, quiet: bool) -> Iterator[Monitor]:
     """A monitor that fits the place: silent, bars on a terminal, or lines in a log."""
     console = Console(stderr=True)
     if quiet:
-        yield Silence()
+        yield SILENCE
     elif not console.is_terminal:
         yield LineMonitor(lambda line: click.echo(line, err=True))
     else:

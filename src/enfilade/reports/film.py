@@ -13,7 +13,7 @@ from enfilade.comparison import ComparedFrame, CompareOptions, compare
 from enfilade.comparison.measures import DisplayedPair
 from enfilade.images.stills import embedded, resized
 from enfilade.images.view import ViewTransform
-from enfilade.monitor import Monitor, Silence
+from enfilade.monitor import SILENCE, Monitor
 from enfilade.records import F32, U8
 from enfilade.reports.layers import LAYERS, Layer, painted, painted_difference
 from enfilade.reports.run import ReportedRun
@@ -124,7 +124,7 @@ class Film:
         of = run.viewing_settings
         options = CompareOptions(viewing=of, exposure_ev=of.exposure_ev, measures=[absolute])
         first, second, *_ = *references, None
-        found = compare(run.folder, first, options, Silence(), second_reference=second, show=show)
+        found = compare(run.folder, first, options, SILENCE, second_reference=second, show=show)
         return found.to_dict()
 
     def _add(self, index: int, differences: Mapping[str, U8] | None = None) -> None:

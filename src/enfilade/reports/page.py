@@ -14,7 +14,7 @@ from enfilade import __version__
 from enfilade.errors import SettingsError
 from enfilade.files import whole_file
 from enfilade.images.view import open_view
-from enfilade.monitor import Monitor, Silence
+from enfilade.monitor import SILENCE, Monitor
 from enfilade.reports.contents import contents
 from enfilade.reports.film import Film
 from enfilade.reports.run import ReportedRun
@@ -35,7 +35,7 @@ def write_report(
     second_reference: Path | str | None = None,
     out: Path | str | None = None,
     max_mb: float = 30.0,
-    monitor: Monitor | None = None,
+    monitor: Monitor = SILENCE,
 ) -> Path:
     """Write a finished or running run as one HTML page.
 
@@ -76,7 +76,6 @@ def write_report(
         raise SettingsError(f"a page of {max_mb:g} MB is too small; give {LEAST_MB:g} or more")
     if second_reference is not None and reference is None:
         raise SettingsError("--second-reference is given alone; give the first one as --reference")
-    monitor = Silence() if monitor is None else monitor
     source = None if reference is None else Path(reference)
     second = None if second_reference is None else Path(second_reference)
     references = tuple(of for of in (source, second) if of is not None)

@@ -14,7 +14,7 @@ from enfilade.files import write_json
 from enfilade.images.codecs import odd_size_note
 from enfilade.images.view import white_of
 from enfilade.methods.base import Task
-from enfilade.monitor import Monitor, Silence
+from enfilade.monitor import SILENCE, Monitor
 from enfilade.runs.delivery import ANALYSIS
 from enfilade.runs.executor import Workers
 from enfilade.runs.folder import RunFolder
@@ -87,7 +87,7 @@ def render(
     return summary
 
 
-def prepare(job: Job, folder: Path, monitor: Monitor | None = None, *, has_preflight: bool = False) -> None:
+def prepare(job: Job, folder: Path, monitor: Monitor = SILENCE, *, has_preflight: bool = False) -> None:
     """Begin a run folder without doing any of its tasks, for commands that share it.
 
     Parameters
@@ -104,7 +104,7 @@ def prepare(job: Job, folder: Path, monitor: Monitor | None = None, *, has_prefl
     """
     with _created(job, folder, has_preflight=has_preflight) as run:
         for note in (*run.notes, *_video_notes(job)):
-            (monitor or Silence()).message(note)
+            monitor.message(note)
 
 
 @dataclass(frozen=True)
