@@ -21,6 +21,7 @@ from typing import IO, Any
 from enfilade.errors import SceneError
 from enfilade.files import scratch_folder
 from enfilade.monitor import Monitor
+from enfilade.resource_limits import cause_of_end
 from enfilade.scene.blender.find import SCRIPT, Blender
 from enfilade.settings import LimitSettings
 
@@ -149,10 +150,9 @@ def _refusal(file: Path, about: str, source: str) -> str:
 
 
 def _crash(about: str, code: int, megabytes: int, last: list[str]) -> str:
-    how = f"signal {-code}" if code < 0 else f"exit code {code}"
     said = "".join(f"\n  {line}" for line in last)
     return (
-        f"{about}: it ended without a result ({how}). The file is damaged, needs more than {megabytes} MB of "
-        f"memory (--set limits.import_mb), or has something that the importer does not know"
+        f"{about}: it {cause_of_end(code)}, without a result. The file is damaged, needs more than "
+        f"{megabytes} MB of memory (--set limits.import_mb), or has something that the importer does not know"
         f"{'. The last lines:' if said else ''}{said}"
     )
