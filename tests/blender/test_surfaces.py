@@ -127,24 +127,44 @@ def test_a_mix_with_a_mirror_keeps_its_energy(context):
     assert albedo(mix, context) == pytest.approx(0.75, rel=0.01)
 
 
-@pytest.mark.parametrize(("is_flipped", "green"), [(False, None), (True, 0.2)])
-def test_normal_maps_of_directx_have_green_downwards(context, monkeypatch, is_flipped, green):
+@pytest.fixture
+def rewritten(context, monkeypatch):
+    """Writes a normal map of one colour; its name in the scene, and the images that are written for it."""
     written = []
 
     def write(_self, _name, image, **_options):
         written.append(image)
-        return "textures/flipped.png"
+        return "textures/rewritten.png"
 
-    monkeypatch.setattr(Textures, "pixels", lambda *_: np.full((2, 2, 3), (0.5, 0.8, 0.9), np.float32))
-    monkeypatch.setattr(Textures, "write", write)
-    output = Output(SimpleNamespace(node=SimpleNamespace(type="NORMAL_MAP")))
-    texture = Texture("textures/tilted.png", "UVMap", (0.5, 0.8, 0.9), raw=True)
-    bsdf = with_normal(plugin("bsdf", "diffuse"), NormalMap(texture, 1.0, output, is_flipped), context)
-    name = bsdf.find("texture/string[@name='filename']").get("value")
-    assert name == ("textures/tilted.png" if green is None else "textures/flipped.png")
+    def make(colour, *terms):
+        monkeypatch.setattr(Textures, "pixels", lambda *_: np.full((2, 2, 3), colour, np.float32))
+        monkeypatch.setattr(Textures, "write", write)
+        output = Output(SimpleNamespace(node=SimpleNamespace(type="NORMAL_MAP")))
+        texture = Texture("textures/tilted.png", "UVMap", colour, raw=True)
+        bsdf = with_normal(
+            plugin("bsdf", "diffuse"), NormalMap(texture, *terms[:1], output, *terms[1:]), context
+        )
+        return bsdf.find("texture/string[@name='filename']").get("value"), written
+
+    return make
+
+
+@pytest.mark.parametrize(("is_flipped", "green"), [(False, None), (True, 0.2)])
+def test_normal_maps_of_directx_have_green_downwards(rewritten, is_flipped, green):
+    name, written = rewritten((0.5, 0.8, 0.9), 1.0, is_flipped)
+    assert name == ("textures/tilted.png" if green is None else "textures/rewritten.png")
     assert [float(image[..., 1].mean()) for image in written] == pytest.approx(
         [] if green is None else [green]
     )
+
+
+@pytest.mark.parametrize(
+    ("strength", "normal"), [(0.5, (0.447, 0.894)), (2.0, (0.936, 0.351)), (4.0, (0.983, 0.184))]
+)
+def test_strong_normal_maps_point_outwards(rewritten, strength, normal):
+    """Numbers of normals that Cycles bakes."""
+    _, (image,) = rewritten((0.9, 0.5, 0.8), strength)
+    assert image[0, 0, [0, 2]] * 2.0 - 1.0 == pytest.approx(normal, abs=1e-3)
 
 
 def test_a_glossy_layer_over_refraction_is_glass(context):

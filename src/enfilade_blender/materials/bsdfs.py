@@ -326,7 +326,8 @@ def _normal_texture(normal: NormalMap, context: Context) -> Element:
     n = context.textures.pixels(value) * 2.0 - 1.0
     n = n * np.array([1.0, -1.0 if is_flipped else 1.0, 1.0])
     n = n * (np.array([-1.0, -1.0, 1.0]) if is_turned else 1.0)  # Cycles negates all of it on a back
-    n = np.concatenate([n[..., :2] * normal.strength, 1.0 + (n[..., 2:] - 1.0) * normal.strength], axis=-1)
+    share = min(max(normal.strength, 0.0), 1.0)  # of z, as in Cycles; x and y may grow
+    n = np.concatenate([n[..., :2] * normal.strength, 1.0 + (n[..., 2:] - 1.0) * share], axis=-1)
     n /= np.maximum(np.linalg.norm(n, axis=-1, keepdims=True), 1e-6)
     name = f"normal {normal.strength:.3g}{' flipped' * is_flipped}{' back' * is_turned}"
     return context.textures.rewritten(value, 0.5 * n + 0.5, name)
