@@ -63,6 +63,9 @@ def note_settings(job: Job, selection: Selection, notes: Notes) -> None:
         if getattr(layer, name, None) is not None:
             what, effect = f"its {name.replace('_', ' ')} is left out", "materials and world are the scene's"
             notes.add("not-carried", layer.name, "Override", what, effect)
+    if not layer.use_solid:
+        what, effect = "that it leaves out surfaces is left out", "they are visible"
+        notes.add("not-carried", layer.name, "Filter", what, effect)
     for other in scene.view_layers:
         if other.use and other != layer and not job.view_layer:
             what = f"of several view layers {layer.name} is used"
@@ -117,8 +120,8 @@ def note_light(selection: Selection, lamps: list[Lamp], notes: Notes, *, has_gla
         if is_left_out:
             notes.add("not-carried", scene.name, f"Light Paths: {name}", "the setting is left out", effect)
     lights = [(lamp.name, lamp.data.cycles) for lamp in lamps]
-    if scene.world is not None:
-        lights.append((scene.world.name, scene.world.cycles))
+    if selection.world is not None:
+        lights.append((selection.world.name, selection.world.cycles))
     for name, light in lights:
         if light.max_bounces < cycles.max_bounces:
             what = f"its limit of bounces, {light.max_bounces}, is left out"

@@ -94,7 +94,7 @@ class Motion:
 
     def _note_data(self, places: dict[str, None], effect: str, notes: Notes) -> None:
         """Note animated materials, worlds, nodes of lamps, and images."""
-        world = self._selection.scene.world
+        world = self._selection.world
         lamps = [lamp for lamp in bpy.data.lights if lamp.users and lamp.use_nodes]
         used = [material for material in bpy.data.materials if material.users] + ([world] if world else [])
         for data in used + lamps:

@@ -31,6 +31,11 @@ class Selection:
     frames: tuple[int, int]
     size: tuple[int, int]
 
+    @property
+    def world(self) -> Any:
+        """World of the scene; None where the view layer leaves it out, as Cycles does then."""
+        return self.scene.world if self.view_layer.use_sky else None
+
     def objects(self) -> list[Any]:
         """Objects whose collections renders show, those of background scenes included."""
         layers, scene = [self.view_layer], self.scene.background_set

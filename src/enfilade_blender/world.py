@@ -33,7 +33,7 @@ FILE = f"textures/{ENVIRONMENT}.exr"
 
 def environment(selection: Selection, sun: Sun | None, folder: Path, notes: Notes) -> list[Element]:
     """The world's emitter; none where it is black and without a sun."""
-    world = selection.scene.world
+    world = selection.world
     _note_world(selection, notes)
     plain = _plain(world, notes)
     if plain is not None:
@@ -166,7 +166,7 @@ def _for_light(world: Any, notes: Notes) -> Any:
     """A copy of a world as diffuse light sees it: no ray is one of the camera, which may see it."""
     copy = world.copy()
     copy.cycles_visibility.camera = True
-    for link in world.node_tree.links:
+    for link in (link for tree in trees(world.node_tree) for link in tree.links):
         node, output = link.from_node, link.from_socket.name
         if node.type == "LIGHT_PATH" or output in VIEW_SOCKETS.get(node.type, ()):
             what, effect = f"{output} is left out", "the camera sees the world that lights the scene"
@@ -179,7 +179,7 @@ def _for_light(world: Any, notes: Notes) -> Any:
 
 
 def _note_world(selection: Selection, notes: Notes) -> None:
-    scene, world = selection.scene, selection.scene.world
+    scene, world = selection.scene, selection.world
     if scene.render.film_transparent:
         effect = "the world is seen where the film would be transparent"
         notes.add("not-carried", scene.name, "Film: Transparent", "the background is opaque", effect)

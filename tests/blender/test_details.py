@@ -97,6 +97,7 @@ def test_what_is_lost_is_noted(exported):
         ("World", "Animation"),
         ("rising", "Animation"),
         ("World", "Ray visibility"),
+        ("World", "Light Path"),  # in a group
         ("coloured", "Object Info"),
     }
 

@@ -223,7 +223,7 @@ OBJECTS = (
     ),
     ("Compositor, sequencer, Freestyle", "not carried", "left out"),
     (
-        "Overrides of the view layer, further view layers, render region, stereoscopy",
+        "Overrides and filter of the view layer, further view layers, render region, stereoscopy",
         "not carried",
         "left out",
     ),

@@ -8,7 +8,7 @@ from pathlib import Path
 
 sys.path[0] = str(Path(__file__).resolve().parents[1])
 
-from corpus import details, edges, flat, lights, objects, office, pitfalls, surfaces  # noqa: E402
+from corpus import details, edges, flat, lights, objects, office, overlooked, pitfalls, surfaces  # noqa: E402
 from corpus.stage import save  # noqa: E402
 
 
@@ -19,7 +19,9 @@ def cases(module):
 
 
 CASES = cases(surfaces) | cases(lights) | cases(objects)
-UNLISTED = cases(details) | cases(edges) | cases(flat) | cases(office) | cases(pitfalls)  # by `--list`
+UNLISTED = {}  # by `--list`
+for module in (details, edges, flat, office, overlooked, pitfalls):
+    UNLISTED |= cases(module)
 
 if __name__ == "__main__":
     if sys.argv[1] == "--list":

@@ -1,0 +1,33 @@
+"""Settings, nodes and objects that an exporter can overlook (see corpus/overlooked.py)."""
+
+from xml.etree import ElementTree as ET
+
+import pytest
+
+pytestmark = [pytest.mark.blender, pytest.mark.slow]
+
+
+@pytest.fixture(scope="module")
+def source(blender):
+    return blender.make("overlooked")[0]
+
+
+@pytest.fixture(scope="module")
+def exported(blender, source):
+    """Root of the scene, and notes by object."""
+    code, out, result = blender.job(source, "overlooked")
+    assert code == 0, result
+    notes = {}
+    for note in result["notes"]:
+        notes.setdefault(note["object"], []).append(note["what"])
+    return ET.parse(out / "scene.xml").getroot(), notes
+
+
+def test_a_view_layer_may_leave_out_the_world(exported):
+    root, notes = exported
+    assert root.find("emitter[@type='constant']") is None
+    assert "World" not in notes
+
+
+def test_a_view_layer_without_surfaces_is_noted(exported):
+    assert exported[1]["ViewLayer"] == ["that it leaves out surfaces is left out"]
