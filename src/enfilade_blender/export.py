@@ -130,4 +130,9 @@ def _integrator(selection: Selection, kinds: set[str], notes: Notes, *, is_volum
             what = f"paths through glass end after {bounces} bounces, in Blender after {through}"
             effect = "what is seen or lit through several panes is darker"
             notes.add("approximated", selection.scene.name, "Light Paths: Transmission", what, effect)
+    if (diffuse := min(cycles.max_bounces, cycles.diffuse_bounces)) < bounces:
+        what = f"diffuse paths end after {bounces} bounces, in Blender after {diffuse}"
+        notes.add(
+            "approximated", selection.scene.name, "Light Paths: Diffuse", what, "indirect light is brighter"
+        )
     return plugin("integrator", "volpath" if is_volumetric else "path", max_depth=bounces + 2)

@@ -31,3 +31,7 @@ def test_a_view_layer_may_leave_out_the_world(exported):
 
 def test_a_view_layer_without_surfaces_is_noted(exported):
     assert exported[1]["ViewLayer"] == ["that it leaves out surfaces is left out"]
+
+
+def test_diffuse_paths_that_are_longer_than_in_blender_are_noted(exported):
+    assert "diffuse paths end after 4 bounces, in Blender after 1" in exported[1]["Scene"]
