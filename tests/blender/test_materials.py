@@ -331,9 +331,12 @@ def test_numbers_and_vectors_of_meshes_are_colours(blender):
     assert code == 0, result
     assert [note["what"] for note in result["notes"]] == ["there is no light"]
     scene = mi.load_file(str(out / "scene.xml"))
-    si = scene.ray_intersect(mi.Ray3f(mi.Point3f([0.0, 2.0, 4.0], 0.1, 3.0), mi.Vector3f(0.0, 0.0, -1.0)))
+    si = scene.ray_intersect(
+        mi.Ray3f(mi.Point3f([0.0, 2.0, 4.0, -2.0], 0.1, 3.0), mi.Vector3f(0.0, 0.0, -1.0))
+    )
     found = np.array(si.bsdf().eval_diffuse_reflectance(si)).T
-    assert found == pytest.approx(np.array([[0.25] * 3, [0.2, 0.4, 0.6], [0.3] * 3]), abs=2e-3)
+    wanted = [[0.25] * 3, [0.2, 0.4, 0.6], [0.3] * 3, [0.3, 0.6, 0.0]]
+    assert found == pytest.approx(np.array(wanted), abs=2e-3)
 
 
 def test_the_number_of_a_colour_is_its_luminance_and_that_of_a_vector_its_mean(blender):

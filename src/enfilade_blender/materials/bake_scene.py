@@ -25,6 +25,7 @@ SMART_ANGLE = 1.15  # radians, Blender's default of 66 degrees
 OBJECT_COLOUR = (1.0, 1.0, 1.0, 1.0)
 LIT_PX = 8  # of a square in even light
 TARGET, GENERATED = "enfilade target", "enfilade generated"
+RENAMED = "enfilade "  # before names of attributes that Blender keeps for its own, such as material_index
 TEXTURES = {  # whose coordinates are generated ones where none are linked
     "TEX_GRADIENT", "TEX_NOISE", "TEX_GABOR", "TEX_VORONOI", "TEX_MUSGRAVE", "TEX_WAVE", "TEX_MAGIC",
     "TEX_CHECKER", "TEX_BRICK",
@@ -155,6 +156,7 @@ class Canvas:
         groups = set(bpy.data.node_groups)
         copy = material.copy()
         put_stand_ins(copy.node_tree)
+        _take_renamed(copy.node_tree, self._object.data.attributes)
         if GENERATED in self._object.data.attributes:
             _take_generated(copy.node_tree)
         _wire(copy.node_tree, output, image, kind)
@@ -198,13 +200,23 @@ def _data(mesh: Mesh) -> Any:
         layer.uv.foreach_set("vector", np.ascontiguousarray(uv, np.float32).ravel())
         layer.active_render = name == mesh.active_uv
     for name, rgba in mesh.colours.items():
-        attribute = data.color_attributes.new(name, "FLOAT_COLOR", "CORNER")
+        new = data.color_attributes.new
+        attribute = new(name, "FLOAT_COLOR", "CORNER") or new(RENAMED + name, "FLOAT_COLOR", "CORNER")
         attribute.data.foreach_set("color", np.ascontiguousarray(rgba, np.float32).ravel())
     if mesh.active_colour:
         data.color_attributes.render_color_index = list(mesh.colours).index(mesh.active_colour)
     data.update(calc_edges=True)
     data.normals_split_custom_set(mesh.normals.reshape(-1, 3))
     return data
+
+
+def _take_renamed(tree: Any, attributes: Any) -> None:
+    """Name the attributes that are renamed where they are read, in groups, too, which are copies."""
+    for node in tree.nodes:
+        if node.type == "GROUP" and node.node_tree is not None:
+            _take_renamed(node.node_tree, attributes)
+        elif node.type == "ATTRIBUTE" and RENAMED + node.attribute_name in attributes:
+            node.attribute_name = RENAMED + node.attribute_name
 
 
 def _take_generated(tree: Any) -> None:

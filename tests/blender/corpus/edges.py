@@ -284,8 +284,12 @@ def painted_lamps(_folder):
 
 
 def attributes(_folder):
-    """A number of vertices and a vector of faces as colours, and a truth value of corners times 0.3."""
+    """A number of vertices and a vector of faces as colours, and a truth value of corners times 0.3.
+
+    Then an attribute of Blender's own, of which nodes in a group make a colour: the number of the slot.
+    """
     new_file()
+    _slots()
     kinds = [
         ("Wear", "FLOAT", "POINT", 0.25),
         ("Side", "FLOAT_VECTOR", "FACE", (0.2, 0.4, 0.6)),
@@ -303,6 +307,22 @@ def attributes(_folder):
         data = plane(name, (2.0 * number, 0.0, 0.0), 1.5, material).data
         for item in data.attributes.new(name, kind, domain).data:
             setattr(item, "vector" if kind == "FLOAT_VECTOR" else "value", value)
+
+
+def _slots():
+    group = bpy.data.node_groups.new("of slots", "ShaderNodeTree")
+    group.interface.new_socket("Color", in_out="OUTPUT", socket_type="NodeSocketColor")
+    read, scaled = node_of(group, "Attribute"), node_of(group, "VectorMath")
+    read.attribute_name, scaled.operation = "material_index", "MULTIPLY"
+    fill(group, scaled, {0: read, 1: (0.3, 0.6, 0.0)})
+    fill(group, group.nodes.new("NodeGroupOutput"), {0: scaled})
+    material, tree, bsdf = shader("slots", "BsdfDiffuse")
+    node = node_of(tree, "Group")
+    node.node_tree = group
+    fill(tree, bsdf, {"Color": node})
+    board = plane("Slots", (-2.0, 0.0, 0.0), 1.5, principled("unused"))
+    board.data.materials.append(material)
+    board.data.polygons[0].material_index = 1
 
 
 def numbers(_folder):
