@@ -2,7 +2,10 @@
 
 from xml.etree import ElementTree as ET
 
+import numpy as np
 import pytest
+
+from enfilade.images import read_exr
 
 pytestmark = [pytest.mark.blender, pytest.mark.slow]
 
@@ -35,3 +38,13 @@ def test_a_view_layer_without_surfaces_is_noted(exported):
 
 def test_diffuse_paths_that_are_longer_than_in_blender_are_noted(exported):
     assert "diffuse paths end after 4 bounces, in Blender after 1" in exported[1]["Scene"]
+
+
+def test_cycles_renders_what_is_imported(blender):
+    code, out, _ = blender.job(blender.make("blurred")[0], "blurred", task="cycles", spp=16)
+    assert code == 0
+    image = read_exr(out / "cycles-0001.exr")["RGB"]
+    # The pixels of the outline are in between; a pixel of one sample is of either colour.
+    colours = np.isclose(image, 0.25, atol=2e-3) | np.isclose(image, 1.0, atol=2e-3)
+    assert 0.7 < colours.mean() < 0.97
+    assert image.min() > 0.24

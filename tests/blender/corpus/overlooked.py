@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A file of settings, nodes and objects that an exporter can overlook."""
 
-from corpus.stage import new_file, plane, principled, world
+from corpus.stage import new_file, plane, principled, shader, world
 
 
 def overlooked(_folder):
@@ -16,3 +16,17 @@ def _filtered(scene):
     world((5.0, 5.0, 5.0))
     layer = scene.view_layers[0]
     layer.use_sky = layer.use_solid = False
+
+
+def blurred(_folder):
+    """A shining square before a grey world, out of focus, on a transparent film, of few samples."""
+    scene = new_file()
+    scene.render.resolution_percentage = 25
+    world((0.25, 0.25, 0.25))
+    screen = plane("Screen", (0.0, 0.0, 0.7), 2.0, shader("screen", "Emission", Strength=1.0)[0])
+    screen.rotation_euler = scene.camera.rotation_euler
+    dof = scene.camera.data.dof
+    dof.use_dof, dof.focus_distance, dof.aperture_fstop = True, 0.5, 0.01
+    scene.render.film_transparent = True
+    scene.view_layers[0].samples = 1
+    scene.cycles.time_limit = 1e-6
