@@ -154,9 +154,12 @@ def _settle_alpha() -> None:
 
 
 def _show_in_viewports() -> None:
-    """Show all in viewports, on whose scene alone Blender writes the values of animations and drivers."""
+    """Show in viewports what renders show, or may: Blender writes values of animations and drivers on these.
+
+    What neither shows is not evaluated in every frame, and in no ray's way, unless something else needs it.
+    """
     for item in (*bpy.data.objects, *bpy.data.collections):
-        item.hide_viewport = False
+        item.hide_viewport = item.hide_render and getattr(item, "animation_data", None) is None
 
 
 def _check_libraries(job: Job) -> None:

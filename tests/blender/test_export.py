@@ -79,7 +79,8 @@ import bpy
 from enfilade_blender import motion
 from enfilade_blender.notes import Notes
 scene = bpy.context.scene
-selection = SimpleNamespace(scene=scene, frames=(1, 10), objects=lambda: list(scene.objects))
+objects = {"scene": scene, "world": scene.world, "objects": lambda: list(scene.objects)}
+selection = SimpleNamespace(frames=(1, 10), **objects)
 motion.check_generated = lambda *_: None
 def found():
     notes, looked = Notes(), motion.Motion(selection, None)

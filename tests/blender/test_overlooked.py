@@ -18,7 +18,7 @@ def source(blender):
 @pytest.fixture(scope="module")
 def exported(blender, source):
     """Root of the scene, and notes by object."""
-    code, out, result = blender.job(source, "overlooked")
+    code, out, result = blender.job(source, "overlooked", limits={"instances": 1000})
     assert code == 0, result
     notes = {}
     for note in result["notes"]:
@@ -48,3 +48,8 @@ def test_cycles_renders_what_is_imported(blender):
     colours = np.isclose(image, 0.25, atol=2e-3) | np.isclose(image, 1.0, atol=2e-3)
     assert 0.7 < colours.mean() < 0.97
     assert image.min() > 0.24
+
+
+def test_an_object_that_renders_do_not_show_is_neither_counted_nor_hit(exported):
+    _, notes = exported  # of few instances
+    assert "Camera" not in notes

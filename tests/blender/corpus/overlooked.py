@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A file of settings, nodes and objects that an exporter can overlook."""
 
-from corpus.stage import new_file, plane, principled, shader, world
+from corpus.stage import new_file, plane, principled, scattering, shader, world
 
 
 def overlooked(_folder):
@@ -9,6 +9,7 @@ def overlooked(_folder):
     _filtered(scene)
     scene.cycles.diffuse_bounces = 1  # of glossy ones there are 4
     plane("Floor", (0.0, 0.0, 0.0), 4.0, principled("floor"))
+    _switched_off(scene)
 
 
 def _filtered(scene):
@@ -16,6 +17,20 @@ def _filtered(scene):
     world((5.0, 5.0, 5.0))
     layer = scene.view_layers[0]
     layer.use_sky = layer.use_solid = False
+
+
+def _switched_off(scene):
+    """A screen before the camera, with 10,000 copies of a cube, that renders do not show."""
+    eye = scene.camera.location
+    screen = plane("Switched off", (eye.x, eye.y + 0.05, eye.z), 1.0, principled("off"))
+    screen.rotation_euler.x = 1.57
+    tree, _, points, end = scattering("Copies", density=1e4)
+    box, copies = tree.nodes.new("GeometryNodeMeshCube"), tree.nodes.new("GeometryNodeInstanceOnPoints")
+    tree.links.new(points.outputs["Points"], copies.inputs["Points"])
+    tree.links.new(box.outputs["Mesh"], copies.inputs["Instance"])
+    tree.links.new(copies.outputs[0], end.inputs[0])
+    screen.modifiers.new("Copies", "NODES").node_group = tree
+    screen.hide_render, scene.frame_end = True, 2
 
 
 def blurred(_folder):
