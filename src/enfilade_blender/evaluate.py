@@ -111,7 +111,7 @@ def _read(graph: Any, result: Evaluated, limits: Limits, notes: Notes) -> None:
     check_generated(graph, limits)
     by_key: dict[Any, Placed | None] = {}
     meshes: dict[int, Mesh] = {}
-    names = _attributes_of_materials()
+    names, triangles = _attributes_of_materials(), 0  # of different meshes
     for instance in graph.object_instances:
         obj = instance.object
         result.instances += 1
@@ -137,18 +137,23 @@ def _read(graph: Any, result: Evaluated, limits: Limits, notes: Notes) -> None:
         elif isinstance(obj.data, bpy.types.Mesh):  # text, curves and metaballs have an instance of one
             key = (instance_name(instance), obj.name_full, obj.data.as_pointer())
             if key not in by_key:
+                read = len(meshes)
                 by_key[key] = _place(instance, meshes, notes, names)
+                if len(meshes) > read:
+                    triangles += len(meshes[obj.data.as_pointer()])
+                    check_triangles(triangles, limits, obj.name)
             placed = by_key[key]
             if placed is not None:
                 placed.matrices.append(matrix)
-                result.triangles += len(placed.mesh)
-        if result.triangles > limits.triangles:
-            raise ExportError(
-                f"the scene has more than {limits.triangles} triangles",
-                obj.name,
-                "lower its levels of subdivision or its number of instances, or raise the limit",
-            )
     result.placed = [placed for placed in by_key.values() if placed is not None]
+
+
+def check_triangles(count: int, limits: Limits, name: str) -> None:
+    """Refuse a scene of more triangles than the limits allow."""
+    if count > limits.triangles:
+        what = f"the scene has more than {limits.triangles} triangles"
+        advice = "lower its levels of subdivision or its number of copies, or raise the limit"
+        raise ExportError(what, name, advice)
 
 
 def check_generated(graph: Any, limits: Limits) -> None:

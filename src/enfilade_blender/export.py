@@ -84,7 +84,7 @@ def export(job: Job) -> dict[str, Any]:
     counts = {
         "objects": len(evaluated.placed),
         "instances": evaluated.instances,
-        "triangles": evaluated.triangles,
+        "triangles": shapes.triangles,
         "materials": shapes.material_count,
         "textures": len(shapes.textures),
     }

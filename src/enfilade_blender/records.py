@@ -145,4 +145,3 @@ class Evaluated:
     placed: list[Placed] = field(default_factory=list)
     lamps: list[Lamp] = field(default_factory=list)
     instances: int = 0
-    triangles: int = 0

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from enfilade_blender.evaluate import check_triangles
 from enfilade_blender.job import Job
 from enfilade_blender.materials.atlas import share_bsdfs
 from enfilade_blender.materials.bake import Bakery
@@ -81,6 +82,8 @@ class Shapes:
     textures : Textures
     identifiers : Identifiers
         Of BSDFs, shapes and emitters.
+    triangles : int
+        Those that are written; of instances once.
     kinds : set of str
         Plugins of the BSDFs of visible surfaces, nested ones included.
     has_unseen_lamps : bool
@@ -88,7 +91,7 @@ class Shapes:
     """
 
     def __init__(self, job: Job, selection: Selection, views: list[View], notes: Notes) -> None:
-        self._out, self._notes = job.out, notes
+        self._out, self._limits, self._notes = job.out, job.limits, notes
         self.textures = Textures(job.out, notes)
         self.identifiers, self._files = Identifiers(), Identifiers()
         self._eyes = np.array([view.pose[:3, 3] for view in views]).reshape(-1, 3)
@@ -101,6 +104,7 @@ class Shapes:
         self._radiances: dict[str, Any] = {}  # by the id of the BSDF
         self._bsdfs: list[Element] = []
         self._baked: list[str] = []  # ids of the BSDFs of one object
+        self.triangles = 0
         self.kinds: set[str] = set()
         self.has_unseen_lamps = False
         (job.out / "meshes").mkdir(exist_ok=True)
@@ -177,7 +181,10 @@ class Shapes:
                 material = replace(material, uv=mesh.active_uv or None)
             radiance = self._radiances[identifier]
             mesh = _with_maps(mesh, material.uv, material.attribute)
-            if is_instanced and radiance is None:
+            is_shared = is_instanced and radiance is None
+            self.triangles += len(mesh) * (1 if is_shared else len(placed.matrices))
+            check_triangles(self.triangles, self._limits, placed.name)
+            if is_shared:
                 instanced += self._shapes_of(f"{name} mesh", mesh, material, None)
                 if not placed.is_seen:
                     self._note_unseen(placed, is_lamp=False)

@@ -495,6 +495,12 @@ def test_limits_hold(blender, files, limit, word):
     assert (code, word in error["what"]) == (3, True)
 
 
+def test_limits_count_the_triangles_of_instances_once(blender, files):
+    code, _, result = blender.job(files["linked_duplicates"], "instanced", limits={"triangles": 2_000_000})
+    large, small = 2 * 500**2, 2 * 125**2  # of a grid
+    assert (code, result["counts"]["triangles"]) == (0, 2 * large + 17 * small)
+
+
 def test_limits_count_levels_that_simplify_leaves(blender, files):
     code, _, result = blender.job(files["simplified"], "limit simplified", limits={"triangles": 100})
     assert (code, result["counts"]["triangles"]) == (0, 8 + 2)
