@@ -20,7 +20,10 @@ IMPORTERS: dict[str, Callable[..., Any]] = {
     ),
     ".fbx": lambda file: bpy.ops.import_scene.fbx(filepath=file),
     ".obj": lambda file: bpy.ops.wm.obj_import(filepath=file),
-    **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), lambda file: bpy.ops.wm.usd_import(filepath=file)),
+    **dict.fromkeys(
+        (".usd", ".usda", ".usdc", ".usdz"),
+        lambda file: bpy.ops.wm.usd_import(filepath=file, import_subdiv=True),
+    ),
 }
 ALPHA_OF_FILES = {  # modes by the endings of files
     ".exr": "PREMUL",

@@ -44,6 +44,15 @@ material.node_tree.links.new(node.outputs[0], bsdf.inputs["Base Color"])
 bpy.ops.export_scene.gltf(filepath=sys.argv[1], export_format="GLTF_SEPARATE", export_keep_originals=True)
 """
 
+SQUARE = """
+{{
+    uniform token subdivisionScheme = "{}"
+    int[] faceVertexCounts = [4]
+    int[] faceVertexIndices = [0, 1, 2, 3]
+    point3f[] points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
+}}
+"""
+
 
 @pytest.fixture(scope="module")
 def imported(blender):
@@ -72,6 +81,14 @@ def test_the_frames_are_those_of_the_cameras_parents(blender):
         _, out, _ = blender.job(file, f"scene {file.name}")
         counts.append(len(json.loads((out / "camera_path.json").read_text())["camera_path"]))
     assert counts == [1, 7, 250]  # USD has the range of the scene
+
+
+@pytest.mark.parametrize(("scheme", "count"), [("none", 2), ("catmullClark", 2 * 4**2)])
+def test_subdivision_surfaces_of_usd_are_subdivided(blender, scheme, count):
+    file = blender.folder / f"{scheme}.usda"
+    file.write_text('#usda 1.0\ndef Mesh "Square"' + SQUARE.format(scheme))
+    code, _, result = blender.job(file, f"scene {scheme}")
+    assert (code, result["counts"]["triangles"]) == (0, count)
 
 
 def test_normal_maps_without_an_image_are_not_baked(imported):
