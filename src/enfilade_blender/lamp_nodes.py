@@ -37,26 +37,26 @@ class LampNodes:
             return 1.0, 1.0, 1.0
         output = tree.get_output_node("CYCLES")
         graph = Graph(lamp.name, self._notes)
-        shader = Nothing() if output is None else graph.shader(output.inputs["Surface"], ())
-        r, g, b = self._emitted(shader, lamp, graph)
+        shader = graph.shader(output.inputs["Surface"], ()) if output else Nothing()
+        r, g, b = self._emitted(shader, lamp)
         return float(r), float(g), float(b)
 
-    def _emitted(self, shader: Shader, lamp: Lamp, graph: Graph) -> np.ndarray:
+    def _emitted(self, shader: Shader, lamp: Lamp) -> np.ndarray:
         """Light of a shader (3,); of others than emissions none."""
         if isinstance(shader, Emission):
-            colour, strength = (self._known(v, 1.0, lamp, graph) for v in (shader.colour, shader.strength))
+            colour, strength = (self._known(v, 1.0, lamp) for v in (shader.colour, shader.strength))
             return np.array(colour.colour) * strength.number
         if not isinstance(shader, Add | Mix):
             return np.zeros(3)
-        first, second = (self._emitted(part, lamp, graph) for part in (shader.first, shader.second))
+        first, second = (self._emitted(part, lamp) for part in (shader.first, shader.second))
         if isinstance(shader, Add):
             return first + second
-        share = min(max(self._known(shader.factor, 0.5, lamp, graph).number, 0.0), 1.0)
+        share = min(max(self._known(shader.factor, 0.5, lamp).number, 0.0), 1.0)
         return (1.0 - share) * first + share * second
 
-    def _known(self, value: Value, instead: float, lamp: Lamp, graph: Graph) -> Constant:
+    def _known(self, value: Value, instead: float, lamp: Lamp) -> Constant:
         """The constant of a value; a number in place of a pattern, with a note."""
-        found = self._constant(value, lamp, graph)
+        found = self._constant(value, lamp)
         if found is None:
             what, effect = (
                 "a pattern of its nodes is left out",
@@ -65,20 +65,10 @@ class LampNodes:
             self._notes.add("not-carried", lamp.name, "Nodes", what, effect)
         return found or Constant((instead,))
 
-    def _constant(self, value: Value, lamp: Lamp, graph: Graph) -> Constant | None:
-        """A constant, what nodes compute of constants, or such a strength of Light Falloff."""
+    def _constant(self, value: Value, lamp: Lamp) -> Constant | None:
+        """A constant, or what nodes compute of constants."""
         if isinstance(value, Constant) or not isinstance(value, Procedural):
             return value if isinstance(value, Constant) else None
-        node, output = value.output.node, value.output.socket.name
-        if node.type == "LIGHT_FALLOFF":
-            smooth = node.inputs["Smooth"]
-            if output != "Quadratic" or smooth.is_linked or smooth.default_value > 0.0:
-                what, effect = (
-                    "its falloff is quadratic",
-                    "it is brighter near the lamp, and darker far from it",
-                )
-                self._notes.add("approximated", lamp.name, node.name, what, effect)
-            return self._constant(graph.value(node.inputs["Strength"], value.output.groups), lamp, graph)
         if any(found.node.type not in COLOUR_NODES for found in upstream(value.output)):
             return None
         key = value.output.socket.as_pointer(), tuple(group.as_pointer() for group in value.output.groups)

@@ -40,6 +40,14 @@ def test_diffuse_paths_that_are_longer_than_in_blender_are_noted(exported):
     assert "diffuse paths end after 4 bounces, in Blender after 1" in exported[1]["Scene"]
 
 
+def test_the_falloff_of_emissive_materials_is_noted(exported):
+    root, notes = exported
+    for name, radiance in (("even", 3.0), ("doubled", 6.0)):
+        found = root.find(f"shape[@id='{name}']/emitter/rgb").get("value").split()
+        assert [float(number) for number in found] == pytest.approx(3 * [radiance], rel=2e-3)
+        assert notes[name] == ["its falloff is quadratic"]
+
+
 def test_cycles_renders_what_is_imported(blender):
     code, out, _ = blender.job(blender.make("blurred")[0], "blurred", task="cycles", spp=16)
     assert code == 0

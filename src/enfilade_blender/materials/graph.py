@@ -144,7 +144,7 @@ class Graph:
         node = found.node
         if node.type in ("RGB", "VALUE"):
             return self._constant(found.socket)
-        if node.type in ("LIGHT_PATH", "SHADERTORGB"):
+        if node.type in ("LIGHT_PATH", "SHADERTORGB", "LIGHT_FALLOFF"):
             return self._of_light(found, socket)
         if found.socket.name == "Color" and not is_number:
             if node.type == "VERTEX_COLOR":
@@ -281,15 +281,21 @@ class Graph:
             what, effect = "the normals of the coat are left out", "its reflections are even"
             self._notes.add("not-carried", self._owner, f"{node.name}: Coat Normal", what, effect)
 
-    def _of_light(self, found: Output, socket: Any) -> Constant:
-        """What an input takes in place of a kind of ray, or of the light on a surface."""
-        if found.node.type == "LIGHT_PATH":
-            value, what = Constant((0.0,)), f"{found.socket.name} is taken as 0"
+    def _of_light(self, found: Output, socket: Any) -> Value:
+        """What an input takes in place of a kind of ray, of the light on a surface, or of its falloff."""
+        node, what = found.node, table.OBJECT_DATA.get(found.node.type, "")
+        if node.type == "LIGHT_PATH":
+            value: Value = Constant((0.0,))
+            what = f"{found.socket.name} is taken as 0"
             effect = "all rays see it as those do in Blender for which that is 0"
+        elif node.type == "LIGHT_FALLOFF":
+            smooth, value = node.inputs["Smooth"], self.value(node.inputs["Strength"], found.groups)
+            if found.socket.name == "Quadratic" and not smooth.is_linked and smooth.default_value == 0.0:
+                return value
+            effect = "it is brighter near the lamp, and darker far from it"
         else:
-            value, what = self._constant(socket), table.OBJECT_DATA[found.node.type]
-            effect = table.OBJECT_EFFECT
-        self._notes.add("approximated", self._owner, found.node.name, what, effect)
+            value, effect = self._constant(socket), table.OBJECT_EFFECT
+        self._notes.add("approximated", self._owner, node.name, what, effect)
         return value
 
 

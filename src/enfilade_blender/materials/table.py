@@ -46,7 +46,7 @@ COLOUR_NODES = {  # functions of their inputs alone
 }  # fmt: skip
 CHANNELS = {"Red": 0, "Green": 1, "Blue": 2, "R": 0, "G": 1, "B": 2, "X": 0, "Y": 1, "Z": 2}  # of outputs
 SPLITTING = ("SEPARATE_COLOR", "SEPRGB", "SEPXYZ")  # nodes of such outputs
-VIEW_NODES = {"FRESNEL", "LAYER_WEIGHT", "LIGHT_PATH", "CAMERA"}
+VIEW_NODES = {"FRESNEL", "LAYER_WEIGHT", "LIGHT_PATH", "CAMERA", "TEX_IES"}
 VIEW_SOCKETS = {"TEX_COORD": ("Camera", "Window", "Reflection"), "NEW_GEOMETRY": ("Incoming", "Backfacing")}
 PLACE_SOCKETS = {  # in the space of the world
     "NEW_GEOMETRY": ("Position", "Normal", "True Normal", "Tangent"),
@@ -57,6 +57,7 @@ OBJECT_DATA = {  # nodes that a bake on a copy of the object does not evaluate a
     "HAIR_INFO": "data of hairs are taken as 0",
     "POINT_INFO": "data of points are taken as 0",
     "AMBIENT_OCCLUSION": "other objects do not occlude",
+    "LIGHT_FALLOFF": "its falloff is quadratic",
     "SHADERTORGB": "the light on a surface is no colour in Cycles, where the input's own value holds",
 }
 OBJECT_EFFECT = "the surface differs where it depends on that"

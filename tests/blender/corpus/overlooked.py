@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A file of settings, nodes and objects that an exporter can overlook."""
 
-from corpus.stage import new_file, plane, principled, scattering, shader, world
+from corpus.stage import fill, new_file, node_of, plane, principled, scattering, shader, world
 
 
 def overlooked(_folder):
@@ -10,6 +10,7 @@ def overlooked(_folder):
     scene.cycles.diffuse_bounces = 1  # of glossy ones there are 4
     plane("Floor", (0.0, 0.0, 0.0), 4.0, principled("floor"))
     _switched_off(scene)
+    _falloffs()
 
 
 def _filtered(scene):
@@ -31,6 +32,19 @@ def _switched_off(scene):
     tree.links.new(copies.outputs[0], end.inputs[0])
     screen.modifiers.new("Copies", "NODES").node_group = tree
     screen.hide_render, scene.frame_end = True, 2
+
+
+def _falloffs():
+    """Emissive planes of even light: of a strength, and of one that is computed."""
+    for x, name in ((-1.5, "even"), (1.5, "doubled")):
+        material, tree, emission = shader(name, "Emission")
+        strength = node_of(tree, "LightFalloff", Strength=3.0).outputs["Constant"]
+        if name == "doubled":
+            single, strength = strength, node_of(tree, "Math", Value=2.0)
+            strength.operation = "MULTIPLY"
+            fill(tree, strength, {1: single})
+        fill(tree, emission, {"Strength": strength})
+        plane(name, (x, 2.0, 1.0), 0.5, material)
 
 
 def blurred(_folder):
