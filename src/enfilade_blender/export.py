@@ -14,7 +14,7 @@ from enfilade_blender.failure import ExportError
 from enfilade_blender.job import Job
 from enfilade_blender.lamp_nodes import LampNodes
 from enfilade_blender.left_out import note_falloff, note_inputs, note_light, note_settings
-from enfilade_blender.lights import emitters, is_finite, is_portal, needs_passing, split_suns
+from enfilade_blender.lights import emitters, is_finite, is_portal, needs_passing, note_glass, split_suns
 from enfilade_blender.limits import check_size
 from enfilade_blender.motion import Motion
 from enfilade_blender.notes import Notes, report_progress
@@ -66,6 +66,8 @@ def export(job: Job) -> dict[str, Any]:
         lamp.factor = nodes.factor(lamp)
     lamps = [lamp for lamp in lamps if is_finite(lamp, notes)]
     lamps, sun = split_suns(lamps, notes)
+    if shapes.kinds & GLASS and selection.scene.cycles.caustics_refractive:
+        note_glass(lamps, notes)
     casts = cast_count(evaluated.instances)
     note_sun(sun, views, selection, notes, casts=casts)
     note_depths(views, selection, notes, casts=casts)

@@ -122,6 +122,15 @@ def split_suns(lamps: list[Lamp], notes: Notes) -> tuple[list[Lamp], Sun | None]
     return [lamp for lamp in lamps if lamp is not brightest], sun
 
 
+def note_glass(lamps: list[Lamp], notes: Notes) -> None:
+    """Note lamps whose size is left out: shadow rays alone reach them, and glass stops these."""
+    for lamp in lamps:
+        size = {"SPOT": "shadow_soft_size", "SUN": "angle"}.get(lamp.data.type, "")
+        if getattr(lamp.data, size, 0.0) > TINY and max(lamp_colour(lamp)) > 0.0:
+            what, effect = "its light does not pass glass", "surfaces behind glass are darker"
+            notes.add("approximated", lamp.name, "Glass", what, effect)
+
+
 def needs_passing(made: list[Element], sun: Sun | None) -> bool:
     """Whether the shapes of lamps may be in the way of light that only shadow rays find."""
     has_shapes = any(element.tag == "shape" for element in made)

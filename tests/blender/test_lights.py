@@ -13,6 +13,7 @@ from enfilade_blender.lights import (
     emitters,
     is_portal,
     needs_passing,
+    note_glass,
     split_suns,
 )
 from enfilade_blender.notes import Notes
@@ -120,6 +121,14 @@ def test_the_brightest_sun_with_a_disc_is_in_the_environment():
     rest, sun = split_suns([weak, bright, lamp("SUN", "sharp")], notes)
     assert (sun.name, [light.name for light in rest]) == ("bright", ["weak", "sharp"])
     assert [note["object"] for note in notes.to_list()] == ["weak"]
+
+
+def test_lamps_of_a_size_that_shadow_rays_alone_reach_are_noted_where_glass_is():
+    notes = Notes()
+    small, dark = lamp("SPOT", "small"), lamp("SPOT", "dark", shadow_soft_size=0.1, energy=0.0)
+    large, soft = lamp("SPOT", "large", shadow_soft_size=0.1), lamp("SUN", "soft", angle=0.1)
+    note_glass([small, dark, large, soft, lamp("POINT"), lamp("AREA")], notes)
+    assert [note["object"] for note in notes.to_list()] == ["large", "soft"]
 
 
 @pytest.mark.parametrize(

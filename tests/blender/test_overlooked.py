@@ -37,7 +37,7 @@ def test_a_view_layer_without_surfaces_is_noted(exported):
 
 
 def test_diffuse_paths_that_are_longer_than_in_blender_are_noted(exported):
-    assert "diffuse paths end after 4 bounces, in Blender after 1" in exported[1]["Scene"]
+    assert "diffuse paths end after 6 bounces, in Blender after 1" in exported[1]["Scene"]
 
 
 def test_the_falloff_of_emissive_materials_is_noted(exported):
@@ -46,6 +46,10 @@ def test_the_falloff_of_emissive_materials_is_noted(exported):
         found = root.find(f"shape[@id='{name}']/emitter/rgb").get("value").split()
         assert [float(number) for number in found] == pytest.approx(3 * [radiance], rel=2e-3)
         assert notes[name] == ["its falloff is quadratic"]
+
+
+def test_a_spot_that_glass_stops_is_noted(exported):
+    assert "its light does not pass glass" in exported[1]["Downlight"]
 
 
 def test_cycles_renders_what_is_imported(blender):

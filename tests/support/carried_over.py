@@ -132,7 +132,7 @@ LIGHTS = (
     (
         "Spot",
         "approximated",
-        "`spot`, also oval: its blend is fitted by a linear ramp; its radius is left out: shadows are sharp",
+        "`spot`, also oval: a linear ramp as blend, without radius: shadows are sharp, glass stops its light",
     ),
     (
         "Soft Falloff of points and spots",
@@ -145,7 +145,11 @@ LIGHTS = (
         "`rectangle` or `disk`; not seen by the camera",
     ),
     ("Sun of angle 0", "mapped", "`directional`"),
-    ("Sun with an angle, beside a brighter one", "approximated", "`directional`: shadows are sharp"),
+    (
+        "Sun with an angle, beside a brighter one",
+        "approximated",
+        "`directional`: shadows are sharp, glass stops its light",
+    ),
     ("Sun with an angle", "mapped", "a disc in the environment map, at least two of its pixels wide"),
     (
         "Nodes of lights: emissions of constants and what is computed of them, sums, mixes, Light Falloff",

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A file of settings, nodes and objects that an exporter can overlook."""
 
-from corpus.stage import fill, new_file, node_of, plane, principled, scattering, shader, world
+from corpus.stage import fill, light, new_file, node_of, plane, principled, scattering, shader, world
 
 
 def overlooked(_folder):
@@ -11,6 +11,8 @@ def overlooked(_folder):
     plane("Floor", (0.0, 0.0, 0.0), 4.0, principled("floor"))
     _switched_off(scene)
     _falloffs()
+    light("SPOT", "Downlight", (0.0, 0.0, 3.0), 50.0, shadow_soft_size=0.1, use_soft_falloff=False)
+    plane("Cover", (0.0, 0.0, 2.9), 0.2, principled("cover", Transmission_Weight=1.0, Roughness=0.0))
 
 
 def _filtered(scene):
