@@ -61,10 +61,18 @@ def image_coordinates(node: Any, groups: tuple[Any, ...]) -> tuple[str, Matrix3]
         return "", IDENTITY
     is_plain = (
         node.projection == "FLAT"
+        and _is_unmapped(node.texture_mapping)
         and image.source in PLAIN_SOURCES
         and image.colorspace_settings.name in PLAIN_SPACES
     )
     return uv_coordinates(node.inputs["Vector"], groups) if is_plain else None
+
+
+def _is_unmapped(own: Any) -> bool:
+    """Whether an image node's own mapping, which Blender shows no more, leaves coordinates as they are."""
+    numbers = (*own.translation, *own.rotation, *own.scale)
+    axes = own.mapping_x + own.mapping_y + own.mapping_z
+    return numbers == (0, 0, 0, 0, 0, 0, 1, 1, 1) and axes == "XYZ" and not (own.use_min or own.use_max)
 
 
 def uv_coordinates(socket: Any, groups: tuple[Any, ...]) -> tuple[str, Matrix3] | None:

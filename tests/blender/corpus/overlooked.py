@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A file of settings, nodes and objects that an exporter can overlook."""
 
-from corpus.stage import fill, light, new_file, node_of, plane, principled, scattering, shader, world
+import numpy as np
+
+from corpus.stage import fill, image, light, new_file, node_of, plane, principled, scattering, shader, world
 
 
 def overlooked(_folder):
@@ -11,6 +13,7 @@ def overlooked(_folder):
     plane("Floor", (0.0, 0.0, 0.0), 4.0, principled("floor"))
     _switched_off(scene)
     _falloffs()
+    _of_old_files()
     light("SPOT", "Downlight", (0.0, 0.0, 3.0), 50.0, shadow_soft_size=0.1, use_soft_falloff=False)
     plane("Cover", (0.0, 0.0, 2.9), 0.2, principled("cover", Transmission_Weight=1.0, Roughness=0.0))
 
@@ -47,6 +50,17 @@ def _falloffs():
             fill(tree, strength, {1: single})
         fill(tree, emission, {"Strength": strength})
         plane(name, (x, 2.0, 1.0), 0.5, material)
+
+
+def _of_old_files():
+    """A script of OSL, and an image that its own mapping, which Blender shows no more, repeats once."""
+    scripted, tree, bsdf = shader("scripted", "BsdfDiffuse")
+    fill(tree, bsdf, {"Color": node_of(tree, "Script").outputs.new("NodeSocketColor", "Color")})
+    plane("Scripted", (-1.0, 1.0, 0.1), 0.5, scripted)
+    halves = image("halves", lambda x, _: np.repeat((x > 0.5)[..., None], 3, -1), 16)
+    mapped, tree, bsdf = shader("mapped", "BsdfDiffuse", Color=halves)
+    tree.nodes["Image Texture"].texture_mapping.scale.x = 2.0
+    plane("Mapped", (1.0, 1.0, 0.1), 0.5, mapped)
 
 
 def blurred(_folder):
