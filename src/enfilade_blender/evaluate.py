@@ -239,6 +239,9 @@ def _note_object(instance: Any, notes: Notes) -> None:
     note_rays(obj.name, obj, RAYS_OF_OBJECTS, "it is visible to all rays", notes)
     if placed != obj:
         note_rays(placed.name, placed, RAYS_OF_OBJECTS, "its instances are visible to all rays", notes)
+    if any(getattr(of, "use_adaptive_subdivision", False) for of in (obj.cycles, *obj.modifiers)):
+        what, effect = "its levels are those of the modifier", "it may be coarser, or of more triangles"
+        notes.add("approximated", obj.name, "Adaptive Subdivision", what, effect)
     layer, original = bpy.context.view_layer, placed.original
     catches = getattr(obj, "is_shadow_catcher", False) or getattr(obj, "is_holdout", False)
     if catches or original.holdout_get(view_layer=layer) or original.indirect_only_get(view_layer=layer):

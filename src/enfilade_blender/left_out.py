@@ -46,6 +46,8 @@ def note_settings(job: Job, selection: Selection, notes: Notes) -> None:
         ("Freestyle", "its lines", picture): render.use_freestyle,
         ("Render Region", "its render region", "the whole frame is rendered"): render.use_border,
         ("Stereoscopy", "its pair of views", "there is one, of the camera itself"): render.use_multiview,
+        ("Simplify: Culling", "its culling", "objects that it removes are there"): render.use_simplify
+        and (scene.cycles.use_camera_cull or scene.cycles.use_distance_cull),
         ("Frame Step", f"its step of {scene.frame_step}", "every frame is rendered"): scene.frame_step != 1,
     }
     for (name, what, effect), is_used in settings.items():

@@ -41,6 +41,11 @@ def test_diffuse_paths_that_are_longer_than_in_blender_are_noted(exported):
     assert "diffuse paths end after 6 bounces, in Blender after 1" in exported[1]["Scene"]
 
 
+def test_culling_and_adaptive_subdivision_are_noted(exported):
+    assert "its culling is left out" in exported[1]["Scene"]
+    assert exported[1]["Floor"] == ["its levels are those of the modifier"]
+
+
 def test_the_falloff_of_emissive_materials_is_noted(exported):
     root, notes, _ = exported
     for name, radiance in (("even", 3.0), ("doubled", 6.0)):

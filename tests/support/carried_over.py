@@ -105,7 +105,7 @@ INPUTS = (
     ("Fresnel, Layer Weight elsewhere", "approximated", "baked as seen along the normal"),
     ("Coordinates and vectors of the camera", "approximated", "baked: the same from all directions"),
     (
-        "Random of objects and islands; properties; attributes of edges, instances, particles and hairs",
+        "Random of objects and islands; properties; OSL; attributes of edges, instances, particles and hairs",
         "approximated",
         "another number, or 0",
     ),
@@ -113,6 +113,11 @@ INPUTS = (
         "Geometry: Position, Normal; coordinates of another object; Vector Transform of the world",
         "baked",
         "each copy of an object by itself; of more than 64 copies as at the first one's place",
+    ),
+    (
+        "Bevel, Pointiness and Ambient Occlusion of a slot; Bump of linked duplicates",
+        "baked",
+        "without the object's other slots; with the slopes of the first duplicate, whatever their scale",
     ),
     ("Light Path", "approximated", "0: all rays see one material"),
     (
@@ -192,6 +197,8 @@ OBJECTS = (
         "`max_depth`: the larger of diffuse and glossy; 2 more with glass; all of transparency with `mask`",
     ),
     ("Frame step", "not carried", "every frame is rendered"),
+    ("Culling of Simplify", "not carried", "all objects are there"),
+    ("Adaptive subdivision", "approximated", "of the modifier's levels"),
     ("Hair, point clouds, volumes, grease pencil", "not carried", "missing"),
     (
         "Triangles, objects and lamps with a vertex, place or light that is NaN or infinite",

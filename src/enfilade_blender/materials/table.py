@@ -56,7 +56,7 @@ OBJECT_DATA = {  # nodes that a bake on a copy of the object does not evaluate a
     "PARTICLE_INFO": "data of particles are taken as 0",
     "HAIR_INFO": "data of hairs are taken as 0",
     "POINT_INFO": "data of points are taken as 0",
-    "AMBIENT_OCCLUSION": "other objects do not occlude",
+    "AMBIENT_OCCLUSION": "other objects and slots do not occlude",
     "SCRIPT": "scripts of OSL are not run, and their outputs are taken as 0",
     "LIGHT_FALLOFF": "its falloff is quadratic",
     "SHADERTORGB": "the light on a surface is no colour in Cycles, where the input's own value holds",

@@ -10,7 +10,12 @@ def overlooked(_folder):
     scene = new_file()
     _filtered(scene)
     scene.cycles.diffuse_bounces = 1  # of glossy ones there are 4
-    plane("Floor", (0.0, 0.0, 0.0), 4.0, principled("floor"))
+    scene.render.use_simplify = scene.cycles.use_camera_cull = True
+    floor = plane("Floor", (0.0, 0.0, 0.0), 4.0, principled("floor"))
+    adaptive = floor.modifiers.new("Subdivision", "SUBSURF")  # has the setting from Blender 5 on
+    (
+        floor.cycles if hasattr(floor.cycles, "use_adaptive_subdivision") else adaptive
+    ).use_adaptive_subdivision = True
     _switched_off(scene)
     _falloffs()
     _of_old_files()
