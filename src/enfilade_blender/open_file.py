@@ -166,7 +166,12 @@ def _show_in_viewports() -> None:
 
 
 def _check_libraries(job: Job) -> None:
-    for library in bpy.data.libraries:
+    """Refuse libraries of other folders, or that are missing, but for such that nothing is linked from.
+
+    From Blender 5 on data may be packed into the file, as those of the essential assets are.
+    """
+    linked = {of.library for of in bpy.data.user_map() if not getattr(of, "is_linked_packed", False)}
+    for library in (library for library in bpy.data.libraries if library in linked):
         file = Path(bpy.path.abspath(library.filepath)).resolve()
         if not _is_allowed(file, job):
             raise ExportError(

@@ -113,6 +113,32 @@ for space in ("Linear Rec.709", "ACEScg"):
     print([note["what"] for note in notes.to_list() if note["node"] == "Working Space"])
 """
 
+PACKED = """
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+sys.path.insert(0, sys.argv[1])
+import bpy
+from enfilade_blender import open_file
+from enfilade_blender.failure import ExportError
+from enfilade_blender.job import Job
+
+class Data:
+    def __init__(self, **values):
+        self.__dict__ |= values
+
+assets, archive = (Data(filepath="/elsewhere/assets.blend") for _ in range(2))
+own = Data(library=None)
+for used in (Data(library=archive, is_linked_packed=True), Data(library=assets, is_linked_packed=False)):
+    data = SimpleNamespace(libraries=[assets, archive], user_map=lambda: {own: set(), used: {own}})
+    open_file.bpy = SimpleNamespace(path=bpy.path, data=data)
+    try:
+        open_file._check_libraries(Job("export", Path("a.blend"), Path("b")))
+        print("read")
+    except ExportError as error:
+        print(error.what)
+"""
+
 
 @pytest.fixture(scope="session")
 def files(blender):
@@ -466,6 +492,14 @@ def test_a_library_of_another_folder_is_refused_unless_it_is_allowed(blender, fi
     assert (code, "outside the allowed folders" in error["what"]) == (3, True)
     code, _, _ = blender.job(apart, "allowed", library_folders=[str(files["library"].parent)])
     assert code == 0
+
+
+def test_libraries_of_which_data_is_packed_are_not_read(blender):
+    """As Blender 5 leaves that of its essential assets in a file."""
+    done = blender.run("-c", PACKED, Path(enfilade_blender.__file__).parents[1])
+    assert done.returncode == 0, done.stderr[-2000:]
+    refused = "it links the library /elsewhere/assets.blend, outside the allowed folders"
+    assert done.stdout.splitlines()[-2:] == ["read", refused]
 
 
 def test_libraries_and_images_are_listed(exported):
