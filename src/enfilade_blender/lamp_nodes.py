@@ -55,24 +55,18 @@ class LampNodes:
         return (1.0 - share) * first + share * second
 
     def _known(self, value: Value, instead: float, lamp: Lamp) -> Constant:
-        """The constant of a value; a number in place of a pattern, with a note."""
-        found = self._constant(value, lamp)
-        if found is None:
-            what, effect = (
-                "a pattern of its nodes is left out",
-                "light is even, and may be brighter or darker",
-            )
-            self._notes.add("not-carried", lamp.name, "Nodes", what, effect)
-        return found or Constant((instead,))
-
-    def _constant(self, value: Value, lamp: Lamp) -> Constant | None:
-        """A constant, or what nodes compute of constants."""
-        if isinstance(value, Constant) or not isinstance(value, Procedural):
-            return value if isinstance(value, Constant) else None
-        if any(found.node.type not in COLOUR_NODES for found in upstream(value.output)):
-            return None
-        key = value.output.socket.as_pointer(), tuple(group.as_pointer() for group in value.output.groups)
-        if key not in self._computed:
-            self._stage = self._stage or BakeScene(self._job.bake_samples, self._frame)
-            self._computed[key] = Constant(self._stage.light_colour(lamp.data, value.output))
-        return self._computed[key]
+        """A constant, or what nodes compute of constants; a number in place of a pattern, with a note."""
+        if isinstance(value, Constant):
+            return value
+        if isinstance(value, Procedural) and all(
+            of.node.type in COLOUR_NODES for of in upstream(value.output)
+        ):
+            groups = tuple(group.as_pointer() for group in value.output.groups)
+            key = value.output.socket.as_pointer(), groups
+            if key not in self._computed:
+                self._stage = self._stage or BakeScene(self._job.bake_samples, self._frame)
+                self._computed[key] = Constant(self._stage.light_colour(lamp.data, value.output))
+            return self._computed[key]
+        what, effect = "a pattern of its nodes is left out", "light is even, and may be brighter or darker"
+        self._notes.add("not-carried", lamp.name, "Nodes", what, effect)
+        return Constant((instead,))
