@@ -25,7 +25,7 @@ SMART_ANGLE = 1.15  # radians, Blender's default of 66 degrees
 OBJECT_COLOUR = (1.0, 1.0, 1.0, 1.0)
 LIT_PX = 8  # of a square in even light
 TARGET, GENERATED = "enfilade target", "enfilade generated"
-RENAMED = "enfilade "  # before names of attributes that Blender keeps for its own, such as material_index
+RENAMED = "enfilade own "  # before names of attributes that Blender keeps for its own, such as material_index
 TEXTURES = {  # whose coordinates are generated ones where none are linked
     "TEX_GRADIENT", "TEX_NOISE", "TEX_GABOR", "TEX_VORONOI", "TEX_MUSGRAVE", "TEX_WAVE", "TEX_MAGIC",
     "TEX_CHECKER", "TEX_BRICK",
@@ -156,9 +156,7 @@ class Canvas:
         groups = set(bpy.data.node_groups)
         copy = material.copy()
         put_stand_ins(copy.node_tree)
-        _take_renamed(copy.node_tree, self._object.data.attributes)
-        if GENERATED in self._object.data.attributes:
-            _take_generated(copy.node_tree)
+        _take_attributes(copy.node_tree, self._object.data.attributes)
         _wire(copy.node_tree, output, image, kind)
         self._object.data.materials.clear()
         self._object.data.materials.append(copy)
@@ -210,23 +208,18 @@ def _data(mesh: Mesh) -> Any:
     return data
 
 
-def _take_renamed(tree: Any, attributes: Any) -> None:
-    """Name the attributes that are renamed where they are read, in groups, too, which are copies."""
-    for node in tree.nodes:
-        if node.type == "GROUP" and node.node_tree is not None:
-            _take_renamed(node.node_tree, attributes)
-        elif node.type == "ATTRIBUTE" and RENAMED + node.attribute_name in attributes:
-            node.attribute_name = RENAMED + node.attribute_name
-
-
-def _take_generated(tree: Any) -> None:
-    """Link the attribute of generated coordinates where these are used, in groups, too, which are copies."""
+def _take_attributes(tree: Any, attributes: Any) -> None:
+    """Read generated coordinates, and what is renamed, from attributes, in groups, too, which are copies."""
     ends = [link.to_socket for link in tree.links if _is_generated(link)]
     for node in tree.nodes:
         if node.type == "GROUP" and node.node_tree is not None:
-            _take_generated(node.node_tree)
+            _take_attributes(node.node_tree, attributes)
         elif node.type in TEXTURES and not node.inputs["Vector"].is_linked:
             ends.append(node.inputs["Vector"])
+        elif node.type == "ATTRIBUTE" and RENAMED + node.attribute_name in attributes:
+            node.attribute_name = RENAMED + node.attribute_name
+    if GENERATED not in attributes:
+        return
     attribute = tree.nodes.new("ShaderNodeAttribute")
     attribute.attribute_name = GENERATED
     for end in ends:
