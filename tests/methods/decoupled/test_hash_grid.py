@@ -1,13 +1,18 @@
 """The hash grid: keys against tuples, lookups against a dictionary."""
 
+import drjit as dr
 import numpy as np
 import pytest
 
 from enfilade.arrays import Array3f, Bool, Float, UInt
+from enfilade.kernels.random import one_sequence
 from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.methods.decoupled import hash_grid_entries as module
-from enfilade.methods.decoupled.hash_grid import LEVELS, SIZE_MASK, entry_key
+from enfilade.methods.decoupled.cache_query import CacheQuery, query_further
+from enfilade.methods.decoupled.hash_grid import LEVELS, ORIGIN, SIZE_MASK, entry_key
 from enfilade.methods.decoupled.hash_grid_entries import MAX_ERROR, MIN_SAMPLES, Entries
+from enfilade.methods.decoupled.integrator import JITTER
+from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 
 UP = np.float32([[0.0, 0.0, 1.0]])
 
@@ -36,7 +41,7 @@ def names_of(points, normals, size):
     """Entries as tuples: cell, and axis of the normal with its sign."""
     axis = np.abs(normals).argmax(axis=1)
     return [
-        (*np.floor(p.astype(np.float32) / size).astype(int), a, n[a] < 0)
+        (*np.floor((p.astype(np.float32) + np.float32(ORIGIN)) / size).astype(int), a, n[a] < 0)
         for p, n, a in zip(points, normals, axis, strict=True)
     ]
 
@@ -195,7 +200,7 @@ def test_lookup_of_points_without_an_entry_misses():
 
 
 def test_moved_points_without_an_entry_use_their_own():
-    point = np.float32([[0.1, 0.2, 0.01]])
+    point = np.float32([[0.1, 0.2, 0.01 - ORIGIN]])
     own = entries_of(np.repeat(keys(point, UP, 0.5), MIN_SAMPLES), np.ones((MIN_SAMPLES, 3)))
     below = keys(point + np.float32([0.0, 0.0, -0.1]), UP, 0.5)
     assert below != keys(point, UP, 0.5)
@@ -206,6 +211,45 @@ def test_moved_points_without_an_entry_use_their_own():
     np.testing.assert_allclose(np.array(light), 1.0)
     both = Entries.joined([own, entries_of(np.repeat(below, MIN_SAMPLES), np.full((MIN_SAMPLES, 3), 7.0))])
     np.testing.assert_allclose(np.array(both.upload().lookup(*at, offset)[0]), 7.0)
+
+
+@pytest.mark.parametrize("width", [2.0**k for k in range(-9, 3)])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_planes_at_round_coordinates_lie_inside_of_cells(axis, width):
+    # What rays hit lies on both sides of such a plane, by rounding.
+    normal = np.eye(3)[[axis]]
+    for at in (-3.0, -0.5, 0.0, 0.25, 2.0):
+        points = np.full((3, 3), 0.3) + np.eye(3)[axis] * (at - 0.3 + np.array([[-1e-6], [0.0], [1e-6]]))
+        assert len(set(keys(points, np.repeat(normal, 3, axis=0), width))) == 1
+
+
+@pytest.mark.parametrize("normal", [(0.0, 0.0, 1.0), (0.0, 0.6, 0.8)])
+def test_jittered_lookups_interpolate_along_the_surface(normal):
+    # A plane that is dark on one side of the border between two columns of entries, and lit on the other.
+    tangents = np.array([(1.0, 0.0, 0.0), np.cross(normal, (1.0, 0.0, 0.0))])
+    rng = np.random.default_rng(4)
+    points = rng.uniform(-12.0, 12.0, (100_000, 2)) @ tangents + 0.37 * np.array(normal)
+    light = np.where(points[:, :1] + ORIGIN < 0.0, 0.0, 1.0).repeat(3, axis=1) + 1.0
+    normals = np.tile(np.float32([normal]), (len(points), 1))
+    grid = Entries.of(keys_of_levels(points, normals, 1.0), light).upload()
+    cache = IrradianceCache(view=None, images=(), weights=(), hash_grid=grid)
+
+    ahead, count = np.linspace(-2.5, 2.5, 41), 4096
+    across = rng.uniform(-6.0, 6.0, len(ahead) * count)
+    points = np.column_stack([np.repeat(ahead - ORIGIN, count), across]) @ tangents + 0.37 * np.array(normal)
+    query = CacheQuery(
+        position=Array3f(points.T.astype(np.float32)),
+        normal=Array3f(normal),
+        shape_index=UInt(1),
+        width=Float(1.0),
+        weight=dr.full(Array3f, 1.0, len(points)),
+        depth=UInt(1),
+        sharp=(),
+    )
+    found, is_miss = query_further(cache, query, one_sequence(len(points)), Float(JITTER))
+    assert not np.array(is_miss).any()
+    ramp = np.array(found)[0].reshape(-1, count).mean(axis=1) - 1.0
+    assert np.abs(ramp - np.clip(0.5 + ahead / JITTER, 0.0, 1.0)).max() < 0.08
 
 
 def test_samples_of_entries_that_are_too_many_go_to_larger_ones(monkeypatch):

@@ -77,10 +77,11 @@ def query_further(cache: IrradianceCache, query: CacheQuery, sampler: Any, jitte
     at = query.position, query.normal, query.shape_index
     reflected, is_miss = _reflected(cache, query, *cache.lookup(*at))
 
-    # Jitter the position in the hash grid, so that many lookups interpolate.
+    # Jitter the position in the hash grid along the surface, so that many lookups interpolate.
     sampler = sampler.fork(STREAM_SALT)
-    offset = 0.5 + jitter * (Array3f(*sampler.next_2d(), sampler.next_1d()) - 0.5)
-    from_grid, is_miss = query_hash_grid(cache, query, is_miss, offset)
+    offset = jitter * (Array3f(*sampler.next_2d(), sampler.next_1d()) - 0.5)
+    offset -= dr.dot(offset, query.normal) * query.normal
+    from_grid, is_miss = query_hash_grid(cache, query, is_miss, 0.5 + offset)
     return Array3f(reflected + from_grid), is_miss
 
 

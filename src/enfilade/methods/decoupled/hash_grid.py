@@ -20,6 +20,7 @@ from enfilade.arrays import Array3f, Bool, Float, Int, UInt, UInt64, lanes, opaq
 LEVELS = 3  # sizes in which points are looked up: that of their path, twice and four times that
 SIZE_MASK, SIZE_OFFSET = 127, 32  # of a key: the exponent of the entry's size, plus the offset
 MIN_WIDTH, MAX_WIDTH = 1e-9, 2.0**90  # of paths, scene units: exponents that these bits can hold
+ORIGIN = 1.0 / 3.0  # of cells: planes at round coordinates lie inside of cells of all sizes, not between two
 SEARCH_STEPS = (16, 8, 4, 2, 1)  # of a binary search in a bucket: up to 31 keys; the mean is at most one
 
 
@@ -140,7 +141,7 @@ def entry_key(position: Any, normal: Any, shape_index: Any, width: Any, level: i
     # Quantize the position.
     exponent = Int(dr.floor(dr.log2(dr.clip(width, MIN_WIDTH, MAX_WIDTH)))) + level
     size = dr.exp2(Float(exponent))
-    cell = Array3f(position) / size + (offset - 0.5)
+    cell = (Array3f(position) + ORIGIN) / size + (offset - 0.5)
 
     # Hash shape, size and direction of the normal, then the coordinates.
     x, y, z = (UInt(Int(dr.floor(coordinate))) for coordinate in cell)

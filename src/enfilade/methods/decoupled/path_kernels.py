@@ -235,7 +235,7 @@ class PathKernels:
         Returns
         -------
         keys : tuple of UInt64
-            One a level, and one above.
+            One a level, and as many above as entries of the largest one need.
         irradiance : Array3f
             Over pi; 0 where the images do not show the surface.
         is_known, is_missing : Bool
@@ -246,7 +246,12 @@ class PathKernels:
         irradiance, is_known = cache.lookup(*at)
         is_diffuse = point.surfaces.is_hit & (dr.max(point.surfaces.albedo) > MIN_DIFFUSE_ALBEDO)
         is_diffuse &= path.is_active
-        return _keys(point, path), irradiance, Bool(is_diffuse & is_known), Bool(is_diffuse & ~is_known)
+        return (
+            _keys(point, path, 2 * LEVELS),
+            irradiance,
+            Bool(is_diffuse & is_known),
+            Bool(is_diffuse & ~is_known),
+        )
 
     def _estimate(
         self, guide: PathGuide | None, depth_weights: Any, path: Path
@@ -283,10 +288,10 @@ def _surviving(path: Path, point: ShadingPoint) -> Any:
     return Array3f(dr.select(is_onward, path.throughput / survival, 0.0))
 
 
-def _keys(point: ShadingPoint, path: Path) -> tuple[Any, ...]:
-    """Keys of the entries of a point: one a level, and the one above."""
+def _keys(point: ShadingPoint, path: Path, count: int = LEVELS + 1) -> tuple[Any, ...]:
+    """Keys of the entries of a point, each of twice the size of the one before."""
     at = point.position, point.surfaces.normal, point.surfaces.shape_index, path.width_at(point)
-    return tuple(entry_key(*at, level) for level in range(LEVELS + 1))
+    return tuple(entry_key(*at, level) for level in range(count))
 
 
 def _aov_lane(path: Path, point: ShadingPoint, sample: BsdfSample, transmitted_at: Any) -> Any:

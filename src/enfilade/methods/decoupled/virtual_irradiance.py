@@ -17,6 +17,7 @@ from enfilade.kernels.estimate import RayCount
 from enfilade.kernels.random import one_sequence
 from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.methods.decoupled.denoising import NOISE_SHARE, OUTLIER, denoise_light
+from enfilade.methods.decoupled.hash_grid import LEVELS
 from enfilade.methods.decoupled.hash_grid_entries import Entries
 from enfilade.methods.decoupled.paths import Path
 from enfilade.methods.decoupled.shot import ShotContext
@@ -96,5 +97,11 @@ def _trace(shot: ShotContext, frame: int, virtual: Geometry, choice: float) -> t
         guide = replace(virtual, depth=np.zeros_like(virtual.depth))
         denoised = denoise_light(guide, light, is_shown, quality=denoiser, outlier=OUTLIER)
         irradiance, times = denoised[is_traced], DENOISED_SAMPLES
-    entries = Entries.of([np.array(key)[chosen] for key in keys], irradiance, unit=shot.unit)
-    return entries.weighted(times), estimate.count
+
+    # Fill entries of all sizes that are looked up: the smallest are as wide as one or two pixels, so that the
+    # centres of pixels leave most of them empty on surfaces at grazing angles.
+    keys = [np.array(key)[chosen] for key in keys]
+    sizes = [
+        Entries.of(keys[level : level + LEVELS + 1], irradiance, unit=shot.unit) for level in range(LEVELS)
+    ]
+    return Entries.joined(sizes).weighted(times), estimate.count
