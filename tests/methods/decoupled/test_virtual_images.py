@@ -99,3 +99,27 @@ def test_surfaces_behind_a_pane_keep_their_positions(tmp_path):
     np.testing.assert_allclose(positions(mirrored)[is_floor][:, 1], 0.0, atol=2e-3)
     assert positions(mirrored)[is_floor][:, 2].max() < 1.0
     assert (mirrored.shape_index != through.shape_index)[where].mean() > 0.3
+
+
+def test_virtual_images_lie_behind_the_clear_parts_of_cut_outs(tmp_path):
+    # The card is clear in its upper left quarter; the veil behind it is not clear enough.
+    def card(name: str, z: float, opacity: str) -> str:
+        return (
+            f'</shape><shape type="rectangle" id="{name}"><transform name="to_world"><scale value="3"/>'
+            f'<translate y="1" z="{z}"/></transform><bsdf type="mask">{opacity}<bsdf type="diffuse"/></bsdf>'
+        )
+
+    checkers = (
+        '<texture name="opacity" type="checkerboard"><rgb name="color0" value="0"/>'
+        '<rgb name="color1" value="1"/></texture>'
+    )
+    cards = card("card", 0.9, checkers) + card("veil", 0.8, '<float name="opacity" value="0.7"/>')
+    renderer = opened_scene(tmp_path, {"ball": pane("front", 1.0) + cards})
+    seen = find_geometry(renderer, front_camera())
+    through = VirtualImages(renderer).find(seen)[1].shape_index
+    names = renderer.describe().shapes
+    is_pane = seen.shape_index == names.index("front") + 1
+    is_pane[12:] = False  # the card's middle is at row 19
+    for side, name in ((np.s_[:, :16], "veil"), (np.s_[:, -16:], "card")):
+        assert is_pane[side].sum() > 50
+        assert set(through[side][is_pane[side]]) == {IN_VIRTUAL_IMAGE + names.index(name) + 1}

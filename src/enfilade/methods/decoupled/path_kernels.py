@@ -17,10 +17,13 @@ from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from enfilade.methods.decoupled.path_depth import weight_after
 from enfilade.methods.decoupled.paths import Path
 from enfilade.methods.decoupled.surface_image import UploadedImage, lookup
+from enfilade.methods.decoupled.virtual_images import MAX_INTERFACES
 from enfilade.records import MIN_DIFFUSE_ALBEDO, SurfaceClass
 from enfilade.renderer import MAX_PATH_DEPTH, Branch, BsdfSample, LobeRenderer, ShadingPoint
 
-MAX_BOUNCES = MAX_PATH_DEPTH - 1  # off specular lobes; longer paths are path traced to their end
+# Bounces off specular lobes; longer paths are path traced to their end. A broad lobe counts as several.
+MAX_BOUNCES = MAX_INTERFACES
+BROAD_BOUNCES = 3
 # Russian roulette: paths survive with this times their throughput after the next bounce, if below one.
 ROULETTE_GAIN = 20.0
 MIN_SURVIVAL = 0.05  # least probability of survival
@@ -182,7 +185,7 @@ class PathKernels:
             width=path.width_at(point),
             spread=dr.maximum(path.spread, lobe_width),
             sampler=sampler,
-            bounces=path.bounces + 1,
+            bounces=path.bounces + dr.select(sample.is_image | sample.is_passed, UInt(1), BROAD_BOUNCES),
             # Mitsuba's `volpath` does not count null interactions.
             depth=path.depth + dr.select(sample.is_passed, UInt(0), UInt(1)),
             branch=path.branch,

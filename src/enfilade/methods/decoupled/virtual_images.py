@@ -25,7 +25,8 @@ CLEAR = SurfaceClass.TRANSPARENT
 IMAGING = (SurfaceClass.MIRROR, CLEAR)
 SKY_DISTANCE = 1e4  # of the sky seen in a mirror, in distances of the mirror
 CHOICES = REFLECT, TRANSMIT = 0.000001, 0.999999  # random numbers that select the lobe: one an image
-MAX_INTERFACES = 8  # mirrors and panes along a path
+MAX_INTERFACES = 8  # mirrors, panes and cut-outs along a path
+SAME_DISTANCE = 1e-5  # relative difference of the distances of a surface by two intersections
 
 
 class VirtualImages:
@@ -145,7 +146,9 @@ class VirtualImages:
 
         # Intersect.
         surfaces = self._renderer.intersect(ahead.rays, ahead.bounce).surfaces
-        forms_image = Bool(False)
+        # What is seen through a cut-out lies farther away.
+        opaque = self._renderer.intersect(ahead.rays, opaque_only=True).surfaces
+        forms_image = opaque.distance > surfaces.distance * (1.0 + SAME_DISTANCE)
         for kind in IMAGING:
             forms_image |= surfaces.surface == int(kind)
         shape_index = dr.select(surfaces.is_hit, surfaces.shape_index, 0)
