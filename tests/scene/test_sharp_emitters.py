@@ -42,9 +42,12 @@ SKIES = {
     f'<rgb name="intensity" value="3"/></emitter>{LAMP.format(0.4, -0.8, 0.5)}{AREA}',
     "many lamps": "".join(LAMP.format(0.1 + 0.01 * i, i / 10 - 1, i % 3 - 1) for i in range(20)) + AREA,
     "bulbs": '<emitter type="constant"><rgb name="radiance" value="0.1"/></emitter>' + BULBS + AREA,
+    "bulbs and faint ones": AREA
+    + BULBS
+    + "".join(BULB.format(0.02, f"{i - 1.5}, 1.9, 0.6", "3, 4, 5") for i in range(3)),
     "soft": '<emitter type="constant"/>' + AREA,
 }
-SHARP = {"sun and sky", "photographed", "lamps", "many lamps", "bulbs"}
+SHARP = {"sun and sky", "photographed", "lamps", "many lamps", "bulbs", "bulbs and faint ones"}
 
 
 def photographed_sky():
@@ -149,9 +152,20 @@ def test_samples_of_the_sky_beside_a_sun_are_few_times_empty(tmp_path):
     assert light.std() < 1.5 * light.mean()  # 2.4
 
 
+def bulbs(radiances):
+    return "".join(BULB.format(0.02, f"{i / 10 - 1}, 1.5, 0.5", of) for i, of in enumerate(radiances))
+
+
 def test_of_many_small_lamps_none_casts_sharp_shadows(tmp_path):
-    bulbs = "".join(BULB.format(0.02, f"{i / 10 - 1}, 1.5, 0.5", "30, 20, 10") for i in range(5))
-    assert not opened(tmp_path, bulbs).has_sharp_light()
+    assert not opened(tmp_path, bulbs(["30, 20, 10"] * 5)).has_sharp_light()
+
+
+def test_faint_lamps_leave_the_shadows_of_others_sharp(tmp_path):
+    # Such as the light of a switch; and black ones.
+    faint, strong = ["0.5, 0.3, 0.1", "0"], ["30, 20, 10"] * 4
+    renderer = opened(tmp_path, bulbs([*faint, *strong]))
+    (sharp, *_) = renderer.state()[-1]
+    assert np.array(sharp).tolist() == [2, 3, 4, 5]
 
 
 def test_all_emitters_of_a_scene_may_be_sharp(tmp_path):

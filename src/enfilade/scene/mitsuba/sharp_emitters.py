@@ -21,6 +21,7 @@ SHADOW_RAYS = 4  # beside that to the sun
 SUN_CANDIDATES = 4  # least number for soft light beside a sun, since those in the sun are left out
 SMALL = 0.08  # half the width of a small lamp, over the mean distance of what it lights
 DISTANCE_RAYS = 256  # for this mean
+MOST_LIGHT = 0.9  # of small lamps: the strongest are sharp where they have so much of it
 
 
 class SharpEmitters:
@@ -45,7 +46,7 @@ class SharpEmitters:
         is_delta = np.array([mi.has_flag(e.flags(), mi.EmitterFlags.Delta) for e in emitters], bool)
         is_small = (weights > 0.0) & _are_small(scene, emitters)
         if is_small.sum() > SHADOW_RAYS:  # the noise of a choice among them costs more than it gains
-            is_small[:] = False
+            is_small = _strongest(emitters, is_small)
         is_sharp = (is_delta | is_small) & (weights > 0.0)  # Mitsuba never samples the others
         self._sharp_count = int(is_sharp.sum())
         self._sharp = lanes(np.flatnonzero(is_sharp).astype(np.uint32)) if self._sharp_count else None
@@ -240,3 +241,23 @@ def _are_small(scene: Any, emitters: Sequence[Any]) -> npt.NDArray[np.bool_]:
     width = np.array([float(np.array(shape.bbox().extents()).max()) for shape in shapes])
     found[places] = 0.5 * width < SMALL * mean
     return found
+
+
+def _strongest(emitters: Sequence[Any], is_small: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Small lamps that have a shadow ray each, (N,): none if they have too little of the light of all."""
+    places = np.flatnonzero(is_small)
+    flux = np.array([_flux(emitters[place]) for place in places])
+    strongest = np.argsort(-flux, kind="stable")[:SHADOW_RAYS]
+    chosen = np.zeros_like(is_small)
+    chosen[places[strongest]] = flux[strongest].sum() >= MOST_LIGHT * flux.sum()
+    return chosen
+
+
+def _flux(emitter: Any) -> float:
+    """Luminous flux of an area emitter, over pi, from points on its shape."""
+    shape = emitter.get_shape()
+    start = shape.sample_position(0.0, mi.Point2f(one_sequence(DISTANCE_RAYS).next_2d()))
+    si = dr.zeros(mi.SurfaceInteraction3f, DISTANCE_RAYS)
+    si.p, si.n, si.uv, si.wi = start.p, start.n, start.uv, mi.Vector3f(0, 0, 1)
+    radiance = mi.luminance(emitter.eval(si))
+    return float(np.array(dr.mean(radiance)).item()) * float(np.array(shape.surface_area()).item())
