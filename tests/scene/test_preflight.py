@@ -58,6 +58,10 @@ NEAR = '<float name="near_clip" value="{}"/>'
         ),
         (f'<integrator type="path"/>{FOG}', ["participating media"]),
         (f'<integrator type="volpath"/>{FOG}', []),
+        (
+            f'{BALL}<shape type="disk" id="slit"><emitter type="directionalarea"/></shape>',
+            ["the emitter of slit is a directionalarea"],
+        ),
     ],
 )
 def test_it_reports_what_frames_will_not_show(scene, body, words):

@@ -79,7 +79,7 @@ def why_inseparable(scene: Any, integrator: Any) -> str:
 
 
 def ignored(scene: Any, integrator: Any) -> list[str]:
-    """What a scene has and frames will not show: lenses, projections and clipping of its sensors, media."""
+    """What a scene has and frames will not show: lenses and clipping of its sensors, media, some emitters."""
     diagonal = float(np.linalg.norm(scene.bbox().extents()))
     notes = [
         f"the scene's sensor is a {sensor.class_name()}: every frame is the perspective image of a pinhole"
@@ -95,6 +95,12 @@ def ignored(scene: Any, integrator: Any) -> list[str]:
                 f"the scene's sensor shows distances of {near:g} to {far:g} alone (near_clip, far_clip): "
                 f"frames show all of the scene, which measures {diagonal:.3g}"
             )
+    notes += [
+        f"the emitter of {emitter.get_shape().id()} is a directionalarea, whose light Mitsuba's path tracers "
+        "never find; use an area or a directional emitter"
+        for emitter in scene.emitters()
+        if emitter.class_name() == "DirectionalArea"
+    ]
     if not is_volumetric(integrator) and has_media(scene):
         notes.append(
             "the scene has participating media, which its integrator ignores: "
