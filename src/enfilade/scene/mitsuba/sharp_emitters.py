@@ -246,7 +246,7 @@ def _are_small(scene: Any, emitters: Sequence[Any]) -> npt.NDArray[np.bool_]:
 def _strongest(emitters: Sequence[Any], is_small: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     """Small lamps that have a shadow ray each, (N,): none if they have too little of the light of all."""
     places = np.flatnonzero(is_small)
-    flux = np.array([_flux(emitters[place]) for place in places])
+    flux = np.array([_flux(emitters[place]) for place in places.tolist()])
     strongest = np.argsort(-flux, kind="stable")[:SHADOW_RAYS]
     chosen = np.zeros_like(is_small)
     chosen[places[strongest]] = flux[strongest].sum() >= MOST_LIGHT * flux.sum()
