@@ -17,6 +17,7 @@ from enfilade.camera.pinhole import Camera
 from enfilade.records import F32, U32, Shading
 
 MAX_PATH_DEPTH = 4  # greatest path depth at which an estimate may begin
+UNLIMITED = 2**31  # depth of paths without a limit, as Mitsuba prints a max_depth of -1
 
 
 class Purpose(IntEnum):
@@ -331,8 +332,8 @@ class LobeRenderer(Renderer, Protocol):
         """The same points at each call: they suggest where bright surfaces are."""
         ...
 
-    def has_depth_limit(self) -> bool:
-        """Whether the scene limits the depth of paths."""
+    def max_path_depth(self) -> int:
+        """Greatest number of segments of a path; :data:`UNLIMITED` where the scene has no limit."""
         ...
 
     def has_sharp_light(self) -> bool:

@@ -313,6 +313,24 @@ def test_every_key_is_found_and_no_other(count):
     np.testing.assert_allclose(found[:, :count], light.T)
 
 
+def test_light_without_sharp_emitters_is_looked_up_apart():
+    points, normals = random_points(400)
+    light = np.random.default_rng(6).uniform(0.5, 1.5, (400, 6))
+    own = np.repeat(np.arange(400), MIN_SAMPLES)
+    levels = keys_of_levels(points[own], normals[own], 0.01)
+    parts = [
+        Entries.joined([]),
+        Entries.of(levels, light[own]),
+        Entries.of([np.zeros(0, np.uint64)] * 4, light[:0]),
+    ]
+    grid = Entries.joined(parts).upload()
+    at = *(Array3f(of.T.astype(np.float32)) for of in (points, normals)), UInt(1), Float(0.01)
+    for soft_only, expected in ((False, light[:, :3]), (True, light[:, 3:])):
+        found, is_found = grid.lookup(*at, soft_only=soft_only)
+        assert np.array(is_found).all()
+        np.testing.assert_allclose(np.array(found).T, expected, rtol=1e-5)
+
+
 def test_lanes_that_are_not_looked_up_find_nothing():
     grid = grid_at((0.3, 0.3, 0.3), 1.0)
     at = Array3f([0.3] * 2, [0.3] * 2, [0.3] * 2), Array3f(*UP[0].tolist()), UInt(1), Float(1.0)

@@ -184,7 +184,7 @@ def test_no_paths_have_no_irradiance(diffuse):
     path = spawn(
         camera_rays(front_camera(), pixel_centres(front_camera(), lanes(pixels))), one_sequence(10), 0.0
     )
-    found = integrator_of(renderer).path_traced(EMPTY, compact(path, UInt()), 10)
+    (found,) = integrator_of(renderer).path_traced(EMPTY, compact(path, UInt()), 10).layers
     assert rows(found).tolist() == [[0.0] * 3] * 10
 
 

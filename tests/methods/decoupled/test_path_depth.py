@@ -13,7 +13,7 @@ from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.methods.decoupled import Decoupled
 from enfilade.methods.decoupled.path_depth import DepthWeights, light_by_depth, weight_after
 from enfilade.methods.decoupled.shot import ShotContext
-from enfilade.renderer import PixelFilter, Purpose, RandomKey
+from enfilade.renderer import UNLIMITED, PixelFilter, Purpose, RandomKey
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
 from enfilade.settings import Settings
 from support.in_memory import run_passes, walk_of
@@ -85,8 +85,8 @@ def test_sharp_light_is_apart(tmp_path):
 
 
 def test_only_scenes_that_limit_the_depth_of_paths_need_it(tmp_path):
-    assert room_with_a_ball_of_glass(tmp_path, 8).has_depth_limit()
-    assert not room_with_a_ball_of_glass(tmp_path, -1).has_depth_limit()
+    assert room_with_a_ball_of_glass(tmp_path, 8).max_path_depth() == 8
+    assert room_with_a_ball_of_glass(tmp_path, -1).max_path_depth() == UNLIMITED
 
 
 def test_without_limit_nothing_is_weighted(tmp_path):

@@ -202,3 +202,37 @@ def test_light_behind_slabs_is_smooth(tmp_path, count):
     difference = one - other
     noise = difference - scipy.ndimage.uniform_filter(difference, 5)
     assert np.std(noise[where]) < 0.02 * one[where].mean()
+
+
+@pytest.mark.slow
+def test_sharp_shadows_stay_sharp_behind_glass(tmp_path):
+    # The shadow of a screen; the entries of the hash grid had all light, and blurred it by three pixels.
+    floor = (
+        '<shape type="rectangle"><transform name="to_world"><scale value="6"/><rotate x="1" angle="-90"/>'
+        '</transform><bsdf type="diffuse"/></shape>'
+    )
+    sun = (
+        '<emitter type="directional"><vector name="direction" x="-0.3" y="-1" z="0"/>'
+        '<rgb name="irradiance" value="3"/></emitter><emitter type="constant"/>'
+    )
+    screen = (
+        '<shape type="rectangle"><transform name="to_world"><scale value="2"/><rotate x="1" angle="90"/>'
+        '<translate x="2.6" y="2"/></transform></shape>'
+    )
+    pane = (
+        '<shape type="rectangle"><transform name="to_world"><scale value="4"/><translate z="1.5"/>'
+        '</transform><bsdf type="thindielectric"/></shape>'
+    )
+    camera = Camera(look_at((0.0, 1.2, 3.0), (0.0, 0.0, 0.0)), 40, *SIZE)
+
+    def steepest(shapes: str) -> float:
+        """The largest step from pixel to pixel across the shadow's edge, over that from lit to dark."""
+        file = tmp_path / "scene.xml"
+        file.write_text(f'<scene version="3.0.0"><integrator type="path"/>{floor}{sun}{shapes}</scene>')
+        walk = walk_of(CameraPath((camera,), (1,), 24.0), MitsubaRenderer(file))
+        rows = run_passes(Decoupled(), walk).colors[0][28:44].mean(axis=2)
+        step = np.abs(np.diff(rows, axis=1)).max(axis=1)
+        return float(np.median(step / (rows.max(axis=1) - rows.min(axis=1))))
+
+    one, other = steepest(screen), steepest(screen + pane)
+    assert other > 0.8 * one, (one, other)

@@ -29,7 +29,7 @@ class CacheQuery:
     depth : UInt
         Bounces of the path before the point, as of :class:`Path`.
     sharp : tuple of Array3f
-        Irradiance over pi by emitters with sharp shadows, where the images of the cache are soft.
+        Irradiance over pi by emitters with sharp shadows, where the cache is soft.
     """
 
     position: Any
@@ -67,9 +67,10 @@ def query_hash_grid(
     if not cache.hash_grid:
         return Array3f(0), Bool(where)
     at = query.position, query.normal, query.shape_index, query.width
-    irradiance, is_found = cache.hash_grid.lookup(*at, offset, where)
+    irradiance, is_found = cache.hash_grid.lookup(*at, offset, where, soft_only=cache.soft_only)
     scale = weight_after(cache.depth_weights.others, query.depth)
-    return Array3f(dr.select(is_found, query.weight * scale * irradiance, 0.0)), Bool(where & ~is_found)
+    reflected = query.weight * sum(query.sharp, scale * irradiance)
+    return Array3f(dr.select(is_found, reflected, 0.0)), Bool(where & ~is_found)
 
 
 def query_further(cache: IrradianceCache, query: CacheQuery, sampler: Any, jitter: Any) -> tuple[Any, Any]:

@@ -34,6 +34,8 @@ class HashGrid:
         Rising.
     irradiance : Array3f
         Irradiance over pi.
+    soft : Array3f or None
+        The same without emitters that cast sharp shadows; None where the scene has none.
     last : UInt
         Lane of the last key.
     starts : UInt
@@ -45,6 +47,7 @@ class HashGrid:
 
     keys: Any
     irradiance: Any
+    soft: Any
     last: Any
     starts: Any
     shift: Any
@@ -57,17 +60,19 @@ class HashGrid:
         ----------
         keys : (N,) uint64
             Each once, in any order; at least one.
-        irradiance : (N, 3) float64
-            Over pi.
+        irradiance : (N, 3 or 6) float64
+            Over pi: of all light; then without emitters that cast sharp shadows.
         """
         order = np.argsort(keys)
         keys, irradiance = keys[order], irradiance[order]
         shift = 64 - max(math.ceil(math.log2(len(keys))), 1)
         buckets = (keys >> np.uint64(shift)).astype(np.int64)
         sizes = np.bincount(buckets, minlength=1 << (64 - shift))
+        light, soft = irradiance[None, :, :3], irradiance[None, :, 3:]
         grid = HashGrid(
             lanes(keys),
-            lanes(irradiance.astype(np.float32)[None]),
+            lanes(light.astype(np.float32)),
+            lanes(soft.astype(np.float32)) if soft.size else None,
             opaque(len(keys) - 1, UInt),
             lanes((np.cumsum(sizes) - sizes).astype(np.uint32)),
             opaque(shift, UInt64),
@@ -76,7 +81,15 @@ class HashGrid:
         return grid
 
     def lookup(
-        self, position: Any, normal: Any, shape_index: Any, width: Any, offset: Any = None, where: Any = True
+        self,
+        position: Any,
+        normal: Any,
+        shape_index: Any,
+        width: Any,
+        offset: Any = None,
+        where: Any = True,
+        *,
+        soft_only: bool = False,
     ) -> tuple[Any, Any]:
         """Irradiance over pi at points, from the smallest entry.
 
@@ -91,6 +104,8 @@ class HashGrid:
             entries. Moved points without an entry use that of the point itself.
         where : Bool
             Lanes that are looked up.
+        soft_only
+            Whether emitters that cast sharp shadows are left out.
 
         Returns
         -------
@@ -98,14 +113,13 @@ class HashGrid:
         is_found : Bool
         """
         irradiance, is_found = Array3f(0), Bool(False)
+        stored = self.soft if soft_only else self.irradiance
         offsets = (0.5,) if offset is None else (offset, 0.5)
         for level in range(LEVELS):
             for moved in offsets:
                 key = entry_key(position, normal, shape_index, width, level, moved)
                 lane, is_here = self._search(key, Bool(where) & ~is_found)
-                irradiance = dr.select(
-                    is_here, dr.gather(Array3f, self.irradiance, lane, is_here), irradiance
-                )
+                irradiance = dr.select(is_here, dr.gather(Array3f, stored, lane, is_here), irradiance)
                 is_found |= is_here
         return irradiance, is_found
 

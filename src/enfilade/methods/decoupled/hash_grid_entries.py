@@ -26,9 +26,10 @@ class Entries:
     ----------
     keys : (N,) uint64
         Rising, each once.
-    sums : (N, 3) float64
+    sums : (N, 3 or 6) float64
+        Of all light; then without emitters that cast sharp shadows where the scene has any.
     squares : (N,) float64
-        Sums of squared luminance.
+        Sums of the squared luminance of all light.
     counts : (N,) int64 or float64
         The latter where estimates have a weight.
     larger : (N, LEVELS) uint64
@@ -57,8 +58,8 @@ class Entries:
         ----------
         levels : ``1 + LEVELS`` of (N,) uint64
             Keys of each estimate: of the entry of its own size, and of larger ones.
-        irradiance : (N, 3)
-            Over pi.
+        irradiance : (N, 3 or 6)
+            Over pi, as of `sums`.
         unit
             Radiance that is 1 after exposure.
         """
@@ -69,7 +70,7 @@ class Entries:
             np.rint(v / quantum) * quantum
             for v, quantum in (
                 (light, QUANTUM * unit),
-                (np.square(light @ REC709_LUMINANCE), QUANTUM * unit**2),
+                (np.square(light[:, :3] @ REC709_LUMINANCE), QUANTUM * unit**2),
             )
         )
         keys, *larger = (level[is_finite] for level in levels)
@@ -87,7 +88,9 @@ class Entries:
     def joined(parts: Sequence[Entries]) -> Entries:
         """Sum up several lists of entries; of none, the empty list."""
         empty, larger = np.zeros(0, np.uint64), np.zeros((0, LEVELS), np.uint64)
-        parts = [Entries(empty, np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64), larger), *parts]
+        width = max((part.sums.shape[1] for part in parts), default=3)
+        parts = [part for part in parts if len(part.keys)]
+        parts = [Entries(empty, np.zeros((0, width)), np.zeros(0), np.zeros(0, np.int64), larger), *parts]
         keys, first, place = np.unique(
             np.concatenate([part.keys for part in parts]), return_index=True, return_inverse=True
         )
@@ -97,7 +100,7 @@ class Entries:
         )
         totals: Any = [np.bincount(place, v, len(keys)) for v in (*sums.T, squares, counts)]
         return Entries(
-            keys, np.stack(totals[:3], axis=1), totals[3], totals[4].astype(counts.dtype), larger[first]
+            keys, np.stack(totals[:-2], axis=1), totals[-2], totals[-1].astype(counts.dtype), larger[first]
         )
 
     def upload(self) -> HashGrid | None:
@@ -110,7 +113,7 @@ class Entries:
         return HashGrid.of(keys, irradiance) if len(keys) else None
 
     def chosen(self, min_samples: int) -> tuple[npt.NDArray[np.uint64], npt.NDArray[np.float64]]:
-        """Keys and irradiance (N, 3) of the entries that are looked up.
+        """Keys and irradiance (N, 3 or 6) of the entries that are looked up.
 
         Entries are chosen from the smallest size up, and the samples of a chosen one are left out of larger
         ones: they contain what is left to them, and lookups that are distributed as the samples are find as
@@ -132,14 +135,14 @@ class Entries:
         chain = np.column_stack([self.keys, self.larger])
         sizes = (chain[:, :LEVELS] & np.uint64(SIZE_MASK)).astype(np.uint8)
         is_left = np.ones(len(self.keys), np.bool_)  # rows whose samples no chosen entry has
-        keys, means = [np.zeros(0, np.uint64)], [np.zeros((0, 3))]
+        keys, means = [np.zeros(0, np.uint64)], [np.zeros((0, self.sums.shape[1]))]
         for size in np.unique(sizes):
             # Sum up the samples that are left in each entry of this size.
             row, level = np.nonzero((sizes == size) & is_left[:, None])
             entries, first, place = np.unique(chain[row, level], return_index=True, return_inverse=True)
             *sums, squares, counts = (np.bincount(place, of, len(entries)) for of in values[row].T)
             irradiance = np.stack(sums, axis=1) / counts[:, None]
-            mean = irradiance @ REC709_LUMINANCE
+            mean = irradiance[:, :3] @ REC709_LUMINANCE
             deviation = np.maximum(squares - counts * np.square(mean), 0.0)  # sum of squared deviations
 
             # Judge each with its group.

@@ -31,12 +31,12 @@ from enfilade.methods.decoupled.paths import (
 )
 from enfilade.methods.decoupled.surface_image import UploadedImage
 from enfilade.records import F32
-from enfilade.renderer import Branch, LobeRenderer
+from enfilade.renderer import MAX_PATH_DEPTH, UNLIMITED, Branch, LobeRenderer
 
 SPECULAR_AOVS = 2  # reflection, transmission
-JITTER = 3.0  # range of lookups in the hash grid, in widths of an entry
+JITTER = 1.0  # range of lookups in the hash grid, in widths of an entry: linear interpolation
 
-# Receives keys by level, and one above, and irradiance over pi (N, 3).
+# Receives keys by level, and one above, and irradiance over pi (N, 3 or 6), as of `Entries`.
 OnMiss = Callable[[list[npt.NDArray[np.uint64]], F32], None]
 
 
@@ -83,10 +83,17 @@ class Integrator:
     Parameters
     ----------
     renderer
+
+    Attributes
+    ----------
+    irradiance_layers : int
+        Of path traced irradiance, see :meth:`path_traced`.
     """
 
     def __init__(self, renderer: LobeRenderer) -> None:
         self.kernels = PathKernels(renderer)
+        self.irradiance_layers = 2 if renderer.has_sharp_light() else 1
+        self._has_depth_limit = renderer.max_path_depth() < UNLIMITED
 
     def diffuse_radiance(self, cache: IrradianceCache, path: Path, on_miss: OnMiss | None = None) -> Samples:
         """Radiance that visible surfaces emit, and reflect by their diffuse lobes.
@@ -206,8 +213,8 @@ class Integrator:
         self._finish(light, cache, deferred, on_miss)
         return Samples((direct, light.summed()))
 
-    def path_traced(self, cache: IrradianceCache, path: Path, count: int) -> Any:
-        """Irradiance over pi at the next surfaces of paths, path traced, with all emitters; Array3f.
+    def path_traced(self, cache: IrradianceCache, path: Path, count: int) -> Samples:
+        """Irradiance over pi at the next surfaces of paths, path traced.
 
         Parameters
         ----------
@@ -217,12 +224,18 @@ class Integrator:
             On their way to the surfaces; at most one a lane.
         count
             Number of lanes.
+
+        Returns
+        -------
+        Samples
+            Layers of all light, and without emitters that cast sharp shadows where the scene has any.
         """
-        found = dr.zeros(Array3f, count)
+        found = tuple(dr.zeros(Array3f, count) for _ in range(self.irradiance_layers))
         if dr.width(path.lane):
             _, irradiance, _ = self.kernels.estimate(cache.path_guide, cache.depth_weights.others, path)
-            scatter_add(found, irradiance, path.lane)
-        return found
+            for layer, of in zip(found, irradiance, strict=True):
+                scatter_add(layer, of, path.lane)
+        return Samples(found)
 
     def _trace_specular(
         self,
@@ -300,7 +313,10 @@ class Integrator:
         if deferred.ends and on_miss is None:
             ends = joined(deferred.ends)
             dr.eval(ends)
-            light.add(self.kernels.terminate(ends), ends.lane)
+            if self._has_depth_limit:  # the rest of a deep path would be too long
+                ends = compact(ends, dr.compress(ends.depth <= MAX_PATH_DEPTH))
+            if dr.width(ends.lane):
+                light.add(self.kernels.terminate(ends), ends.lane)
 
     def _missed_light(
         self, cache: IrradianceCache, deferred: _Deferred, on_miss: OnMiss | None = None
@@ -337,8 +353,9 @@ class Integrator:
             weight, irradiance, keys = self.kernels.estimate(
                 cache.path_guide, cache.depth_weights.others, unknown
             )
-            contributions.append((weight * irradiance, unknown.lane))
+            contributions.append((weight * irradiance[0], unknown.lane))
             if on_miss:
                 count = dr.width(missing)
-                on_miss([np.array(key)[:count] for key in keys], rows(irradiance)[:count])
+                light = np.hstack([rows(of)[:count] for of in irradiance])
+                on_miss([np.array(key)[:count] for key in keys], light)
         return contributions

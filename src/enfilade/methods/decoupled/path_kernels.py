@@ -175,19 +175,21 @@ class PathKernels:
         sample = self._renderer.sample_specular(point, sampler, branch=path.branch, soft_only=soft_only)
 
         # Extend the path; a broad lobe widens it.
+        # Mitsuba's `volpath` does not count null interactions.
+        depth = path.depth + dr.select(sample.is_passed, UInt(0), UInt(1))
+        is_alive = sample.is_alive & (depth < self._renderer.max_path_depth())
         is_narrow = sample.bounce.is_delta | sample.is_passed
         lobe_width = dr.select(is_narrow, 0.0, ENTRY_LOBE_WIDTH * dr.rsqrt(sample.bounce.pdf))
         extended = Path(
             lane=_aov_lane(path, point, sample, transmitted_at),
             rays=sample.rays,
             bounce=sample.bounce,
-            throughput=Array3f(dr.select(sample.is_alive, path.throughput * sample.throughput, 0.0)),
+            throughput=Array3f(dr.select(is_alive, path.throughput * sample.throughput, 0.0)),
             width=path.width_at(point),
             spread=dr.maximum(path.spread, lobe_width),
             sampler=sampler,
             bounces=path.bounces + dr.select(sample.is_image | sample.is_passed, UInt(1), BROAD_BOUNCES),
-            # Mitsuba's `volpath` does not count null interactions.
-            depth=path.depth + dr.select(sample.is_passed, UInt(0), UInt(1)),
+            depth=depth,
             branch=path.branch,
         )
 
@@ -258,21 +260,27 @@ class PathKernels:
 
     def _estimate(
         self, guide: PathGuide | None, depth_weights: Any, path: Path
-    ) -> tuple[Any, Any, tuple[Any, ...]]:
+    ) -> tuple[Any, tuple[Any, ...], tuple[Any, ...]]:
         """Path trace the irradiance at the next surface; also its weight, and its keys in the hash grid.
 
-        Its paths begin at the first surface, or at the second, as those of the irradiance in the cache. The
+        It is that of all light, and without emitters that cast sharp shadows where the scene has any. Its
+        paths begin at the first surface, or at the second, as those of the irradiance in the cache. The
         weight has what a ``max_depth`` leaves of it after further bounces.
         """
         sampler = path.sampler.fork(ESTIMATE_SALT)
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
         path_depth = 2 if path.bounce else 1
-        direct, indirect = self._renderer.estimate_diffuse(point, sampler, path_depth, guide)
-        irradiance = Array3f(direct + indirect)
+        is_divided = self._renderer.has_sharp_light()
+        light = self._renderer.estimate_diffuse(point, sampler, path_depth, guide, soft_only=is_divided)
+        irradiance = [Array3f(sum(light))]
+        if is_divided:
+            sharp, _ = self._renderer.sharp_light(point, path.sampler.fork(SHARP_SALT))
+            irradiance.insert(0, Array3f(irradiance[0] + sharp))
         scale = weight_after(depth_weights, path.depth)
         if path.bounce is None:  # in the hash grid it is that of a path after one bounce
-            irradiance *= dr.rcp(scale)
-        return Array3f(path.throughput * point.surfaces.albedo * scale), irradiance, _keys(point, path)
+            irradiance = [of * dr.rcp(scale) for of in irradiance]
+        weight = Array3f(path.throughput * point.surfaces.albedo * scale)
+        return weight, tuple(irradiance), _keys(point, path)
 
     def _terminate(self, path: Path) -> Any:
         """Path trace the specular lobes at the next surface to their end."""

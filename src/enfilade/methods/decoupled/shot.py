@@ -33,7 +33,7 @@ from enfilade.methods.decoupled.surface_image import UploadedImage, blank_image
 from enfilade.methods.decoupled.virtual_images import VirtualImages
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.records import F32, Mask
-from enfilade.renderer import LobeRenderer, PixelFilter, RandomKey, Rays
+from enfilade.renderer import UNLIMITED, LobeRenderer, PixelFilter, RandomKey, Rays
 from enfilade.settings import DecoupledSettings, LimitSettings, ViewingSettings
 
 HASH_GRID_KEYFRAMES = 8  # nearest ones whose entries are looked up
@@ -229,7 +229,7 @@ class ShotContext:
     def depth_keyframes(self) -> list[int]:
         """Keyframes from which light by path depth is estimated; none where the scene does not limit it."""
         step = max(len(self.keyframes) // KEYFRAMES, 1)
-        return self.keyframes[::step] if self.renderer.has_depth_limit() else []
+        return self.keyframes[::step] if self.renderer.max_path_depth() < UNLIMITED else []
 
     @cached_property
     def _depth_weights(self) -> DepthWeights:

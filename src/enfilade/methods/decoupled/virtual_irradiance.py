@@ -13,7 +13,7 @@ import drjit as dr
 import numpy as np
 
 from enfilade.arrays import lanes, rows
-from enfilade.kernels.estimate import RayCount
+from enfilade.kernels.estimate import RayCount, Samples
 from enfilade.kernels.random import one_sequence
 from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.methods.decoupled.denoising import NOISE_SHARE, OUTLIER, denoise_light
@@ -25,7 +25,7 @@ from enfilade.methods.decoupled.virtual_images import CHOICES, IN_VIRTUAL_IMAGE
 from enfilade.records import Geometry, Shading
 from enfilade.renderer import Purpose, Rays
 
-SPP = 8  # paths of a pixel
+SPP = 16  # paths of a pixel (bathroom, staircase2)
 DENOISED_SAMPLES = 16  # estimates as which a denoised pixel counts
 
 
@@ -75,28 +75,30 @@ def _trace(shot: ShotContext, frame: int, virtual: Geometry, choice: float) -> t
     pixels = pixels[lane[chosen]]
 
     # Estimate their irradiance.
-    def radiance(rays: Rays, sampler: Any) -> Any:
+    def radiance(rays: Rays, sampler: Any) -> Samples:
         return shot.integrator.path_traced(cache, seen_along(rays, sampler), dr.width(sampler.seed))
 
     is_traced = np.zeros(virtual.shape_index.shape, np.bool_)
     is_traced.flat[pixels] = True
     random = shot.walk.random(frame, Purpose.VIRTUAL_IMAGES)
-    estimate = shot.estimate(camera, is_traced, radiance, random, layers=1)
+    estimate = shot.estimate(camera, is_traced, radiance, random, layers=shot.integrator.irradiance_layers)
     estimate.add(SPP)
 
-    # Denoise it together with what the prepass images show, whose pixels would be black among these; a
-    # denoised pixel is as reliable as many samples.
-    irradiance, times = estimate.shading.color, 1
+    # Denoise it; a denoised pixel is as reliable as many samples.
+    layers, times = [shading.color for shading in estimate.shadings], 1
     if (denoiser := shot.settings.denoiser) != "none":
-        is_shown = is_traced.copy()
-        is_shown.flat[known_pixels] = True
-        variance = np.float32(NOISE_SHARE) * estimate.shading.variance
-        light = Shading(irradiance, variance).to_image(is_traced)
-        light.color.reshape(-1, 3)[known_pixels] = known_irradiance
         # Virtual images do not lie in the planes that their depths and normals describe.
         guide = replace(virtual, depth=np.zeros_like(virtual.depth))
-        denoised = denoise_light(guide, light, is_shown, quality=denoiser, outlier=OUTLIER)
-        irradiance, times = denoised[is_traced], DENOISED_SAMPLES
+        for layer, shading in enumerate(estimate.shadings):
+            variance = np.float32(NOISE_SHARE) * shading.variance
+            light, is_shown = Shading(shading.color, variance).to_image(is_traced), is_traced.copy()
+            if layer == 0:  # what the prepass images show is black among these; they have all light
+                is_shown.flat[known_pixels] = True
+                light.color.reshape(-1, 3)[known_pixels] = known_irradiance
+            denoised = denoise_light(guide, light, is_shown, quality=denoiser, outlier=OUTLIER)
+            layers[layer] = denoised[is_traced]
+        times = DENOISED_SAMPLES
+    irradiance = np.hstack(layers)
 
     # Fill entries of all sizes that are looked up: the smallest are as wide as one or two pixels, so that the
     # centres of pixels leave most of them empty on surfaces at grazing angles.

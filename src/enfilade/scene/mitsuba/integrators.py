@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 
 from enfilade.errors import SceneError
-from enfilade.renderer import MAX_PATH_DEPTH
+from enfilade.renderer import MAX_PATH_DEPTH, UNLIMITED
 
 PATH_TRACERS = {  # Mitsuba's classes that trace paths from the camera to their end; their plugins
     "PathIntegrator": "path",
@@ -17,7 +17,6 @@ PATH_TRACERS = {  # Mitsuba's classes that trace paths from the camera to their 
     "VolpathMisIntegratorImpl": "volpathmis",
 }
 NEAR_SHARE = 0.01  # of the scene's diagonal: what is nearer than that is hardly ever in sight
-UNLIMITED = 2**31  # as Mitsuba prints a max_depth of -1
 
 
 def scene_integrator(scene: Any, max_depth: int) -> Any:
@@ -59,9 +58,9 @@ def shortened(integrator: Any, path_depth: int, end_depth: int | None = None) ->
     return _limited(integrator, max(max_depth - ends, 0), max(rr_depth - path_depth, 1))
 
 
-def has_depth_limit(integrator: Any) -> bool:
-    """Whether a path tracer limits the depth of its paths."""
-    return _depths(integrator)[0] < UNLIMITED
+def max_path_depth(integrator: Any) -> int:
+    """Greatest depth of the paths of a path tracer; :data:`UNLIMITED` without a limit."""
+    return min(_depths(integrator)[0], UNLIMITED)
 
 
 def why_inseparable(scene: Any, integrator: Any) -> str:

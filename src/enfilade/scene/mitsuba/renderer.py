@@ -40,9 +40,9 @@ from enfilade.scene.mitsuba.bsdfs import why_opaque
 from enfilade.scene.mitsuba.emitters import find_emitters, partly_sampled, trace_photons
 from enfilade.scene.mitsuba.files import collected_warnings
 from enfilade.scene.mitsuba.integrators import (
-    has_depth_limit,
     ignored,
     is_volumetric,
+    max_path_depth,
     scene_integrator,
     shortened,
     why_inseparable,
@@ -173,9 +173,9 @@ class MitsubaRenderer:
     def _photons(self) -> Photons:
         return trace_photons(self._scene)
 
-    def has_depth_limit(self) -> bool:
-        """See :meth:`enfilade.renderer.LobeRenderer.has_depth_limit`."""
-        return has_depth_limit(self._integrator)
+    def max_path_depth(self) -> int:
+        """See :meth:`enfilade.renderer.LobeRenderer.max_path_depth`."""
+        return max_path_depth(self._integrator)
 
     def has_sharp_light(self) -> bool:
         """See :meth:`enfilade.renderer.LobeRenderer.has_sharp_light`."""
