@@ -102,6 +102,8 @@ def test_weights_are_relative_to_the_depth_at_which_cached_paths_begin():
     found = weight_after(weights.images, bounces)
     np.testing.assert_allclose(np.array(found), [1, 6 / 8, 4 / 8, 2 / 8, 2 / 8])
     np.testing.assert_allclose(np.array(weight_after(weights.others, bounces)), others)
+    soft = [8 / 6, 1, 4 / 6, 2 / 6, 2 / 6]
+    np.testing.assert_allclose(np.array(weight_after(weights.soft, bounces)), soft, rtol=1e-6)
 
 
 def test_prepass_images_are_weighted_as_other_irradiance(monkeypatch):
@@ -114,5 +116,50 @@ def test_prepass_images_are_weighted_as_other_irradiance(monkeypatch):
 
 def test_without_light_nothing_is_left_out():
     weights = DepthWeights.of([[0.0] * 5])
-    for of in (weights.images, weights.others):
-        assert np.array(of).tolist() == [1.0] * 4
+    for of in (weights.images, weights.others, weights.soft):
+        assert np.array(weight_after(of, UInt([0, 3, 8]))).tolist() == [1.0] * 3
+
+
+SPHERE_LAMP = (
+    '<shape type="sphere"><point name="center" x="0.5" y="1.5" z="0"/><float name="radius" value="0.3"/>'
+    '<emitter type="area"><rgb name="radiance" value="5"/></emitter></shape>'
+)
+POINT_LAMP = (
+    '<emitter type="point"><point name="position" x="0.5" y="1.5" z="0"/>'
+    '<rgb name="intensity" value="2"/></emitter>'
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("max_depth", "error"), [(6, 0.0), (8, 0.28), (12, 0.1), (20, 0.03)])
+@pytest.mark.parametrize("lamp", [SPHERE_LAMP, POINT_LAMP], ids=["soft", "sharp"])
+def test_deep_paths_end_at_the_limit(tmp_path, max_depth, error, lamp):
+    """Behind three panes, which have six interfaces, paths of depth 8 and more light a wall.
+
+    Cached light has the weight of the fourth surface there: 1.09 and 1.24 of the light, 0.99 and 0.93, 1.01
+    and 1.00.
+    """
+    walls = "".join(
+        f'<shape type="rectangle"><transform name="to_world"><scale value="2"/>{place}</transform>'
+        '<bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="0.8"/></bsdf></bsdf>'
+        "</shape>"
+        for place in ('<rotate x="1" angle="-90"/>', '<translate z="-1.5"/>')
+    )
+    panes = "".join(
+        f'<shape type="cube"><transform name="to_world"><scale x="3" y="3" z="0.02"/><translate z="{z}"/>'
+        '</transform><bsdf type="dielectric"/></shape>'
+        for z in (0.6, 0.8, 1.0)
+    )
+    integrator = f'<integrator type="path"><integer name="max_depth" value="{max_depth}"/></integrator>'
+    file = tmp_path / "scene.xml"
+    file.write_text(f'<scene version="3.0.0">{integrator}{walls}{panes}{lamp}</scene>')
+    renderer, camera = MitsubaRenderer(file), Camera(look_at((0.0, 1.0, 4.0), (0.0, 0.6, 0.0)), 30.0, 32, 24)
+    walk = walk_of(CameraPath((camera,), (1,), 24.0), renderer)
+    wall = np.s_[4:20, 4:28]
+    found = run_passes(Decoupled(), walk).colors[0][wall].mean()
+    key = RandomKey(1, 0, Purpose.REFERENCE)
+    pixels = np.arange(32 * 24, dtype=np.uint32)
+    traced = renderer.trace(camera, pixels, key, spp=2048, pixel_filter=PixelFilter.GAUSSIAN)
+    expected = traced.color.reshape(24, 32, 3)[wall].mean()
+    assert (expected > 0.0) == (max_depth > 6)
+    assert found == pytest.approx(expected, rel=error, abs=1e-3)

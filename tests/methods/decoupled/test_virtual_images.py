@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
+from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry, positions
 from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE, VirtualImages
+from enfilade.scene.mitsuba.renderer import MitsubaRenderer
+from enfilade.scene.mitsuba.shapes import LAMP
 from support.material_scene import MATERIALS, front_camera, opened_scene, pane
 
 
@@ -123,3 +126,24 @@ def test_virtual_images_lie_behind_the_clear_parts_of_cut_outs(tmp_path):
     for side, name in ((np.s_[:, :16], "veil"), (np.s_[:, -16:], "card")):
         assert is_pane[side].sum() > 50
         assert set(through[side][is_pane[side]]) == {IN_VIRTUAL_IMAGE + names.index(name) + 1}
+
+
+def test_lamps_in_a_mirror_are_seen_as_themselves(tmp_path):
+    # Rays of the camera pass the shapes of lamps, but mirrors show them.
+    def upright(name: str, z: float, scale: float, inner: str) -> str:
+        return (
+            f'<shape type="rectangle" id="{name}"><transform name="to_world"><scale value="{scale}"/>'
+            f'<rotate y="1" angle="{180 if z > 0 else 0}"/><translate z="{z}"/></transform>{inner}</shape>'
+        )
+
+    mirror, wall = upright("mirror", -1.4, 3, '<bsdf type="conductor"/>'), upright("wall", 4.0, 9, "")
+    panel = upright("panel", 2.0, 0.5, f'<bsdf type="null" id="{LAMP}"/><emitter type="area"/>')
+    file = tmp_path / "scene.xml"
+    file.write_text(f'<scene version="3.0.0"><integrator type="path"/>{mirror}{wall}{panel}</scene>')
+    renderer = MitsubaRenderer(file)
+    camera = Camera(look_at((0.0, 0.0, 3.0), (0.0, 0.0, 0.0)), 40.0, 48, 36)
+    shown = VirtualImages(renderer).find(find_geometry(renderer, camera))[0].shape_index
+    of_panel, of_wall = (renderer.describe().shapes.index(name) + 1 for name in ("panel", "wall"))
+    assert (shown == IN_VIRTUAL_IMAGE + of_panel).sum() > 20
+    assert (shown == IN_VIRTUAL_IMAGE + of_wall).sum() > 20
+    assert not (shown == of_panel).any()

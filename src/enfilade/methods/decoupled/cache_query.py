@@ -68,7 +68,8 @@ def query_hash_grid(
         return Array3f(0), Bool(where)
     at = query.position, query.normal, query.shape_index, query.width
     irradiance, is_found = cache.hash_grid.lookup(*at, offset, where, soft_only=cache.soft_only)
-    scale = weight_after(cache.depth_weights.others, query.depth)
+    weights = cache.depth_weights.soft if cache.soft_only else cache.depth_weights.others
+    scale = weight_after(weights, query.depth)
     reflected = query.weight * sum(query.sharp, scale * irradiance)
     return Array3f(dr.select(is_found, reflected, 0.0)), Bool(where & ~is_found)
 

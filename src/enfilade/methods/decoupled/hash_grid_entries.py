@@ -20,7 +20,7 @@ QUANTUM = 2.0**-30  # of estimates after exposure: sums up to 2^23 are exact in 
 
 @dataclass(frozen=True, eq=False)
 class Entries:
-    """Sums of estimates of irradiance over pi, by entry of the size that the estimates' paths have.
+    """Sums of estimates of irradiance over pi, by entry; mostly of the size that the estimates' paths have.
 
     Attributes
     ----------

@@ -30,8 +30,9 @@ from enfilade.methods.decoupled.paths import (
     scatter_add,
 )
 from enfilade.methods.decoupled.surface_image import UploadedImage
+from enfilade.methods.decoupled.virtual_images import MAX_INTERFACES
 from enfilade.records import F32
-from enfilade.renderer import MAX_PATH_DEPTH, UNLIMITED, Branch, LobeRenderer
+from enfilade.renderer import MAX_PATH_DEPTH, Branch, LobeRenderer
 
 SPECULAR_AOVS = 2  # reflection, transmission
 JITTER = 1.0  # range of lookups in the hash grid, in widths of an entry: linear interpolation
@@ -93,7 +94,7 @@ class Integrator:
     def __init__(self, renderer: LobeRenderer) -> None:
         self.kernels = PathKernels(renderer)
         self.irradiance_layers = 2 if renderer.has_sharp_light() else 1
-        self._has_depth_limit = renderer.max_path_depth() < UNLIMITED
+        self._is_shallow = renderer.max_path_depth() < 2 * MAX_INTERFACES
 
     def diffuse_radiance(self, cache: IrradianceCache, path: Path, on_miss: OnMiss | None = None) -> Samples:
         """Radiance that visible surfaces emit, and reflect by their diffuse lobes.
@@ -232,7 +233,7 @@ class Integrator:
         """
         found = tuple(dr.zeros(Array3f, count) for _ in range(self.irradiance_layers))
         if dr.width(path.lane):
-            _, irradiance, _ = self.kernels.estimate(cache.path_guide, cache.depth_weights.others, path)
+            _, irradiance, _ = self.kernels.estimate(cache.path_guide, cache.depth_weights.of_entries, path)
             for layer, of in zip(found, irradiance, strict=True):
                 scatter_add(layer, of, path.lane)
         return Samples(found)
@@ -313,7 +314,7 @@ class Integrator:
         if deferred.ends and on_miss is None:
             ends = joined(deferred.ends)
             dr.eval(ends)
-            if self._has_depth_limit:  # the rest of a deep path would be too long
+            if self._is_shallow:  # the rest of a deep path would be too long
                 ends = compact(ends, dr.compress(ends.depth <= MAX_PATH_DEPTH))
             if dr.width(ends.lane):
                 light.add(self.kernels.terminate(ends), ends.lane)
@@ -351,7 +352,7 @@ class Integrator:
         if dr.width(missing):
             unknown = compact(missed.path, missing)
             weight, irradiance, keys = self.kernels.estimate(
-                cache.path_guide, cache.depth_weights.others, unknown
+                cache.path_guide, cache.depth_weights.of_entries, unknown
             )
             contributions.append((weight * irradiance[0], unknown.lane))
             if on_miss:

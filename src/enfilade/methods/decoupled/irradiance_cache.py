@@ -46,7 +46,8 @@ class IrradianceCache:
         One an image, for surfaces that several of them show.
     hash_grid : HashGrid or None
     soft_only : bool
-        Whether the images are without next-event estimates of emitters that cast sharp shadows.
+        Whether the images are without next-event estimates of emitters that cast sharp shadows, and the hash
+        grid is looked up without their light.
     path_guide : PathGuide or None
         Of paths that estimate irradiance.
     min_coverage : float

@@ -36,10 +36,18 @@ class DepthWeights:
         Of irradiance images, by the number of bounces. None: all are 1.
     others : Float or None
         Of all other irradiance.
+    soft : Float or None
+        Of that without sharp light.
     """
 
     images: Any = None
     others: Any = None
+    soft: Any = None
+
+    @property
+    def of_entries(self) -> tuple[Any, Any]:
+        """Of the light in an entry of the hash grid: all, and soft."""
+        return self.others, self.soft
 
     @staticmethod
     def of(light: Sequence[Sequence[float]]) -> DepthWeights:
@@ -56,7 +64,7 @@ class DepthWeights:
             return UNWEIGHTED
         total = np.sum(light, axis=0)
         soft, sharp = total[:-1], total[-1]
-        return DepthWeights(_relative(soft, 0), _relative(soft + sharp, 1))
+        return DepthWeights(_relative(soft, 0), _relative(soft + sharp, 1), _relative(soft, 1))
 
 
 UNWEIGHTED = DepthWeights()

@@ -21,7 +21,7 @@ from enfilade.methods.decoupled.virtual_images import MAX_INTERFACES
 from enfilade.records import MIN_DIFFUSE_ALBEDO, SurfaceClass
 from enfilade.renderer import MAX_PATH_DEPTH, Branch, BsdfSample, LobeRenderer, ShadingPoint
 
-# Bounces off specular lobes; longer paths are path traced to their end. A broad lobe counts as several.
+# Bounces off specular lobes, after which paths are path traced to their end. A broad lobe counts as several.
 MAX_BOUNCES = MAX_INTERFACES
 BROAD_BOUNCES = 3
 # Russian roulette: paths survive with this times their throughput after the next bounce, if below one.
@@ -146,7 +146,7 @@ class PathKernels:
             normal=point.surfaces.normal,
             shape_index=point.surfaces.shape_index,
             width=path.width_at(point),
-            weight=dr.select(is_diffuse, path.throughput * albedo, 0.0),
+            weight=dr.select(is_diffuse, path.throughput * albedo * self._lit(path), 0.0),
             depth=path.depth,
             sharp=sharp,
         )
@@ -200,7 +200,7 @@ class PathKernels:
         vertex = replace(vertex, radiance=emitted + vertex.radiance)
         is_split = sample.is_split & path.is_active & (path.branch == int(Branch.REFLECTED))
         is_end = extended.bounces >= MAX_BOUNCES
-        direct = Array3f(path.throughput * sample.direct)
+        direct = Array3f(path.throughput * sample.direct * self._lit(path))
         return direct, Bool(is_split), Bool(is_end), vertex
 
     def _gather(self, cache: IrradianceCache, path: Path) -> tuple[Any, Vertex]:
@@ -259,7 +259,7 @@ class PathKernels:
         )
 
     def _estimate(
-        self, guide: PathGuide | None, depth_weights: Any, path: Path
+        self, guide: PathGuide | None, depth_weights: tuple[Any, Any], path: Path
     ) -> tuple[Any, tuple[Any, ...], tuple[Any, ...]]:
         """Path trace the irradiance at the next surface; also its weight, and its keys in the hash grid.
 
@@ -276,11 +276,15 @@ class PathKernels:
         if is_divided:
             sharp, _ = self._renderer.sharp_light(point, path.sampler.fork(SHARP_SALT))
             irradiance.insert(0, Array3f(irradiance[0] + sharp))
-        scale = weight_after(depth_weights, path.depth)
+        scales = [weight_after(of, path.depth) for of in depth_weights[: len(irradiance)]]
         if path.bounce is None:  # in the hash grid it is that of a path after one bounce
-            irradiance = [of * dr.rcp(scale) for of in irradiance]
-        weight = Array3f(path.throughput * point.surfaces.albedo * scale)
+            irradiance = [of * dr.rcp(scale) for of, scale in zip(irradiance, scales, strict=True)]
+        weight = Array3f(path.throughput * point.surfaces.albedo * self._lit(path) * scales[0])
         return weight, tuple(irradiance), _keys(point, path)
+
+    def _lit(self, path: Path) -> Any:
+        """1 where the next surface may reflect light within the scene's limit of path depth, else 0."""
+        return dr.select(path.depth + 1 < self._renderer.max_path_depth(), 1.0, 0.0)
 
     def _terminate(self, path: Path) -> Any:
         """Path trace the specular lobes at the next surface to their end."""

@@ -149,6 +149,7 @@ class VirtualImages:
         # What is seen through a cut-out lies farther away.
         opaque = self._renderer.intersect(ahead.rays, opaque_only=True).surfaces
         forms_image = opaque.distance > surfaces.distance * (1.0 + SAME_DISTANCE)
+        forms_image &= surfaces.surface != int(SurfaceClass.EMISSIVE)  # mirrors show lamps
         for kind in IMAGING:
             forms_image |= surfaces.surface == int(kind)
         shape_index = dr.select(surfaces.is_hit, surfaces.shape_index, 0)

@@ -101,9 +101,11 @@ def _trace(shot: ShotContext, frame: int, virtual: Geometry, choice: float) -> t
     irradiance = np.hstack(layers)
 
     # Fill entries of all sizes that are looked up: the smallest are as wide as one or two pixels, so that the
-    # centres of pixels leave most of them empty on surfaces at grazing angles.
+    # centres of pixels leave most of them empty on surfaces at grazing angles. A larger one has the weight of
+    # one pixel, since it is for what lies between, not for the wide paths of other lobes.
     keys = [np.array(key)[chosen] for key in keys]
     sizes = [
-        Entries.of(keys[level : level + LEVELS + 1], irradiance, unit=shot.unit) for level in range(LEVELS)
+        Entries.of(keys[level : level + LEVELS + 1], irradiance, unit=shot.unit).weighted(times / 4.0**level)
+        for level in range(LEVELS)
     ]
-    return Entries.joined(sizes).weighted(times), estimate.count
+    return Entries.joined(sizes), estimate.count

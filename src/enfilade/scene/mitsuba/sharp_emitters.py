@@ -249,7 +249,7 @@ def _strongest(emitters: Sequence[Any], is_small: npt.NDArray[np.bool_]) -> npt.
     flux = np.array([_flux(emitters[place]) for place in places.tolist()])
     strongest = np.argsort(-flux, kind="stable")[:SHADOW_RAYS]
     chosen = np.zeros_like(is_small)
-    chosen[places[strongest]] = flux[strongest].sum() >= MOST_LIGHT * flux.sum()
+    chosen[places[strongest]] = flux[strongest].sum() >= MOST_LIGHT * flux.sum() > 0.0
     return chosen
 
 
@@ -259,5 +259,6 @@ def _flux(emitter: Any) -> float:
     start = shape.sample_position(0.0, mi.Point2f(one_sequence(DISTANCE_RAYS).next_2d()))
     si = dr.zeros(mi.SurfaceInteraction3f, DISTANCE_RAYS)
     si.p, si.n, si.uv, si.wi = start.p, start.n, start.uv, mi.Vector3f(0, 0, 1)
+    si.shape = mi.ShapePtr(shape)  # radiance by vertex is that of one triangle
     radiance = mi.luminance(emitter.eval(si))
     return float(np.array(dr.mean(radiance)).item()) * float(np.array(shape.surface_area()).item())
