@@ -174,10 +174,11 @@ class PathKernels:
         soft_only = cache.soft_only and path.bounce is None  # the rest is in the diffuse image
         sample = self._renderer.sample_specular(point, sampler, branch=path.branch, soft_only=soft_only)
 
-        # Extend the path; a broad lobe widens it.
-        # Mitsuba's `volpath` does not count null interactions.
+        # End it at the scene's limit; Mitsuba's `volpath` does not count null interactions.
         depth = path.depth + dr.select(sample.is_passed, UInt(0), UInt(1))
         is_alive = sample.is_alive & (depth < self._renderer.max_path_depth())
+
+        # Extend the path; a broad lobe widens it.
         is_narrow = sample.bounce.is_delta | sample.is_passed
         lobe_width = dr.select(is_narrow, 0.0, ENTRY_LOBE_WIDTH * dr.rsqrt(sample.bounce.pdf))
         extended = Path(
