@@ -151,12 +151,16 @@ def test_a_worker_that_can_not_be_started(tmp_path, opened, monkeypatch):
 def test_workers_end_with_their_command(tmp_path, whole, blow):
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs inherit SIG_IGN
     order(tmp_path, light_3="hang")
+    attempt = tmp_path / "attempts" / "light-3"
     with subprocess.Popen(command(tmp_path, "processes", 1), env=environment()) as process:  # noqa: S603
-        wait_for((tmp_path / "attempts" / "light-3").exists)
-        worker = int((tmp_path / "attempts" / "light-3").read_text().split()[0])
-        assert is_alive(worker)
-        process.send_signal(blow)
-        assert process.wait() != 0
+        try:
+            wait_for(lambda: attempt.exists() and attempt.read_text().endswith("\n"))
+            worker = int(attempt.read_text().split()[0])
+            assert is_alive(worker)
+            process.send_signal(blow)
+            assert process.wait(60) != 0
+        finally:
+            process.kill()
     wait_for(lambda: not is_alive(worker))
     render(toy_job(tmp_path), tmp_path / "run", Silence())
     assert digest(tmp_path / "run") == whole
