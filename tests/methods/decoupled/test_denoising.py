@@ -52,6 +52,26 @@ def test_one_outlier_does_not_tint_the_surface():
     assert around.mean() < 0.1
 
 
+def test_an_outlier_on_a_narrow_surface_leaves_no_dot():
+    is_narrow = np.zeros_like(WHERE)
+    is_narrow[59:61, 20:140] = True
+    light = noisy(2)
+    light.color[60, 80] = 1e4
+    light.variance[60, 80] = 1e8
+    clamped, unclamped = (denoised(light, is_narrow, clamped=where) for where in (is_narrow, None))
+    assert unclamped[is_narrow].max() > 10.0
+    assert clamped[is_narrow].max() < 2.0
+
+
+def test_pixels_without_neighbours_are_not_clamped():
+    light = noisy(2)
+    is_thin = np.zeros_like(WHERE)
+    is_thin[::4, ::4] = True
+    light.color[~is_thin] = 0.0
+    clamped, unclamped = (denoised(light, is_thin, clamped=where) for where in (is_thin, None))
+    np.testing.assert_array_equal(clamped, unclamped)
+
+
 def test_the_light_of_outliers_is_kept_without_a_blob():
     """One path in two thousand finds nearly half of the light: the mean stays, and the surface is even."""
     hits = np.random.default_rng(1).random(WHERE.shape) < 1.0 / 2000.0

@@ -145,14 +145,14 @@ def test_fireflies_are_clamped_to_their_brightest_neighbour():
     color = np.ones((5, 9, 3), np.float32)
     color[2, 3] = color[0, 8] = color[2, 6] = 50.0  # one of them at the corner
     color[1, 3] = 1.5
-    weights = image(firefly_weights(lanes(color), width=9, height=5, times=2.0), 5, 9)
+    weights = image(firefly_weights(lanes(color), width=9, height=5), 5, 9)
     expected = color.copy()
     expected[2, 3], expected[0, 8], expected[2, 6] = 3.0, 2.0, 2.0
     np.testing.assert_allclose(color * weights[..., None], expected, rtol=1e-5)
 
 
 def redistributed(light, variance, **options):
-    options = {"times": 2.0, "levels": 4, **options}
+    options = {"levels": 4, **options}
     color, variance = redistribute_fireflies(
         lanes(grey(light)), lanes(variance.astype(np.float32)), wall(*light.shape), **options
     )

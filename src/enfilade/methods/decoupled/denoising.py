@@ -11,7 +11,7 @@ import scipy.ndimage
 from enfilade.arrays import Array3f, Array4f, image, lanes
 from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.methods.decoupled.records import IrradianceImage
-from enfilade.methods.decoupled.wavelet import guide_of, smooth
+from enfilade.methods.decoupled.wavelet import firefly_weights, guide_of, smooth
 from enfilade.methods.denoise import denoise
 from enfilade.records import F32, Geometry, Mask, Shading
 
@@ -29,6 +29,7 @@ def denoise_irradiance(
     *,
     outlier: float = OUTLIER,
     is_excess_kept: bool = False,
+    narrow: Mask | None = None,
 ) -> IrradianceImage:
     """An irradiance image whose layers are denoised apart; its variance is 0.
 
@@ -41,6 +42,8 @@ def denoise_irradiance(
         Of the denoiser.
     outlier, is_excess_kept
         As of :func:`denoise_light`.
+    narrow
+        Pixels, (H, W), whose indirect light is clamped for the denoiser.
     """
     direct, indirect = (
         Shading(
@@ -51,6 +54,7 @@ def denoise_irradiance(
                 quality=quality,
                 outlier=outlier,
                 is_excess_kept=is_excess_kept,
+                clamped=narrow if layer is image.indirect else None,
             ),
             np.zeros_like(layer.variance),
             layer.dropped,
@@ -69,6 +73,7 @@ def denoise_light(
     outlier: float,
     is_excess_kept: bool = False,
     is_extended: bool = False,
+    clamped: Mask | None = None,
 ) -> F32:
     """Denoise light with normals as guides, and keep its mean along surfaces.
 
@@ -97,6 +102,9 @@ def denoise_light(
         Whether light beyond that limit is distributed over the whole image, in proportion to the light there.
     is_extended
         Whether the guides of sampled pixels extend beyond them, so that the denoiser sees no edges there.
+    clamped
+        Pixels, (H, W), whose fireflies are clamped for the denoiser: it leaves them on narrow surfaces. The
+        correction adds their light.
 
     Returns
     -------
@@ -104,7 +112,8 @@ def denoise_light(
     """
     # Denoise, light below zero apart.
     positive = np.maximum(light.color, np.float32(0))
-    above = _denoised(positive, geometry, where, quality, is_extended=is_extended)
+    seen = positive if clamped is None else _without_fireflies(positive, clamped)
+    above = _denoised(seen, geometry, where, quality, is_extended=is_extended)
     below: F32 | np.float32 = np.float32(0)
     if light.color.min() < 0.0:
         below = _denoised(positive - light.color, geometry, where, quality, is_extended=is_extended)
@@ -135,6 +144,14 @@ def denoise_light(
         total = np.maximum(bounded.sum(axis=(0, 1), dtype=np.float64, where=where[..., None]), 1e-20)
         bounded *= np.maximum(1.0 + excess / total, 0.0).astype(np.float32)
     return bounded
+
+
+def _without_fireflies(color: F32, where: Mask) -> F32:
+    """Light whose fireflies are clamped, but for pixels with less than two neighbours that have light."""
+    height, width = where.shape
+    weights = image(firefly_weights(lanes(color), width=width, height=height, rank=2), height, width)
+    clamped: F32 = color * np.where(where & (weights > 0.0), weights, np.float32(1))[..., None]
+    return clamped
 
 
 def _denoised(color: F32, geometry: Geometry, where: Mask, quality: str, *, is_extended: bool) -> F32:

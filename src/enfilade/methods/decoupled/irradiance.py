@@ -20,7 +20,7 @@ NARROW_PATHS = 4  # times the paths of a pixel, on narrow surfaces: a denoiser l
 MIN_DISOCCLUSION = 5e-3  # of a frame's pixels: fewer have no image, and are estimated in each frame
 
 
-def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage, RayCount]:
+def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage, Mask, RayCount]:
     """Gather the irradiance of some pixels of an irradiance image, at their centres.
 
     Narrow surfaces, such as bevels, have more paths.
@@ -35,6 +35,8 @@ def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage
     -------
     image : IrradianceImage
         Its variance is that of its paths, times :data:`NOISE_SHARE`.
+    narrow : (H, W) bool
+        Its narrow surfaces.
     count : RayCount
     """
     walk, cache = shot.walk, shot.final_gather_cache(frame)
@@ -47,17 +49,18 @@ def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage
     spp = irradiance_spp(shot.settings, len(shot.keyframes))
     is_edge, _ = surface_edges(shot.images.irradiance_geometry(frame))
     estimate.add(spp)
-    estimate.add((NARROW_PATHS - 1) * spp, narrow_surfaces(is_edge, where)[where])
+    narrow = narrow_surfaces(is_edge, where)
+    estimate.add((NARROW_PATHS - 1) * spp, narrow[where])
     direct, indirect = (shading.to_image(where) for shading in estimate.shadings)
-    return IrradianceImage(direct, indirect, where).with_noise(NOISE_SHARE), estimate.count
+    return IrradianceImage(direct, indirect, where).with_noise(NOISE_SHARE), narrow, estimate.count
 
 
 def gather_keyframe(shot: ShotContext, frame: int) -> Output:
     """The irradiance image of a keyframe, denoised."""
     geometry = shot.images.irradiance_geometry(frame)
-    image, count = _gather(shot, frame, geometry.has_diffuse)
+    image, narrow, count = _gather(shot, frame, geometry.has_diffuse)
     if shot.settings.denoiser != "none":
-        image = denoise_irradiance(geometry, image, shot.settings.denoiser)
+        image = denoise_irradiance(geometry, image, shot.settings.denoiser, narrow=narrow)
     return Output({frame: image}, {"rays": {"irradiance": count.rays}, "dropped": count.dropped})
 
 
@@ -84,7 +87,7 @@ def fill_disocclusions(shot: ShotContext, segment: Segment) -> Output:
             continue
 
         # Gather the surfaces that no keyframe shows, and go on with both halves.
-        image, own = _gather(shot, middle, shot.uncovered(middle, {}))
+        image, _, own = _gather(shot, middle, shot.uncovered(middle, {}))
         images[middle], uploaded[middle] = image, upload(shot.images.irradiance_geometry(middle), image)
         count += own
         pending += [(middle, last), (first, middle)]

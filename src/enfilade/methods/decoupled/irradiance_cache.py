@@ -28,7 +28,6 @@ from enfilade.methods.decoupled.wavelet import guide_of, redistribute_fireflies,
 from enfilade.records import Geometry, Mask
 
 MIN_COVERAGE = 0.02  # bilinear weight of the pixels around a point, above which an image shows it
-FIREFLY = 2.0  # times the second brightest neighbour: brighter pixels are fireflies
 FIREFLY_LEVELS = 5  # of the wavelet that distributes their energy
 
 
@@ -126,7 +125,7 @@ def upload(geometry: Geometry, irradiance: IrradianceImage) -> UploadedImage:
     )
     if irradiance.indirect.variance.any():
         guide = guide_of(geometry, irradiance.is_known)
-        indirect = redistribute_fireflies(*indirect, guide, times=FIREFLY, levels=FIREFLY_LEVELS)
+        indirect = redistribute_fireflies(*indirect, guide, levels=FIREFLY_LEVELS)
     return upload_layers(geometry, lanes(irradiance.is_known), [direct, indirect])
 
 

@@ -23,7 +23,6 @@ NOISE_SHARE = 0.5  # of the samples' variance: low-discrepancy samples have less
 OUTLIER = 8.0  # times the denoised value: brighter estimates are limited where the mean is kept
 DENOISED_SHARE = 0.25  # of the samples' deviation that the denoiser leaves
 DENOISED_SUPPORT = 5  # pixels, over which that deviation is averaged
-FIREFLY = 2.0  # times the brightest neighbour: brighter pixels are fireflies
 
 
 def filter_spatially(
@@ -57,7 +56,7 @@ def filter_spatially(
     height, width = where.shape
     # Find fireflies in the sum: where few rays sample an AOV, each of its samples would be one.
     total = sum((lanes(aov.color) for aov in aovs), Array3f(0))
-    weights = firefly_weights(total, width=width, height=height, times=FIREFLY)
+    weights = firefly_weights(total, width=width, height=height)
     return [_filtered(g, aov, where, weights, unit) for g, aov in zip(surfaces, aovs, strict=True)]
 
 

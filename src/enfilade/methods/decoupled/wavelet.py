@@ -17,6 +17,7 @@ SPLINE = (1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0)  # cubic B
 TINY = 1e-8
 SMOOTHING_LEVELS = 4
 SMOOTHING_DEVIATIONS = 3.0  # of the luminance, across which it smooths
+FIREFLY = 2.0  # times a neighbour's luminance: brighter pixels are fireflies
 NORMAL_EXPONENT = 64  # of the cosine: normals 12 degrees apart have a weight of a quarter
 # Neighbours at later levels are correlated, since they are averages over common pixels. They reduce the
 # logarithm of the variance by this part of the reduction by independent ones (exact for a flat image).
@@ -181,10 +182,10 @@ def _filter_level(
     return total / weight, total_variance / whole, squares / whole
 
 
-def redistribute_fireflies(
-    color: Any, variance: Any, guide: Guide, *, times: float, levels: int
-) -> tuple[Any, Any]:
+def redistribute_fireflies(color: Any, variance: Any, guide: Guide, *, levels: int) -> tuple[Any, Any]:
     """Distribute the energy of an image's fireflies along their surfaces; its total stays.
+
+    The limit is in units of the second brightest neighbour's luminance, since fireflies also come in pairs.
 
     Parameters
     ----------
@@ -192,8 +193,6 @@ def redistribute_fireflies(
     variance : Float
         Of the luminance.
     guide
-    times
-        Limit, in units of the second brightest neighbour's luminance, since fireflies also come in pairs.
     levels
         Of the wavelet that distributes it, as of :func:`smooth`.
 
@@ -203,7 +202,7 @@ def redistribute_fireflies(
     variance : Float
     """
     # Split the image into its clamped part and the remainder.
-    kept = firefly_weights(color, width=guide.width, height=guide.height, times=times, rank=2)
+    kept = firefly_weights(color, width=guide.width, height=guide.height, rank=2)
     beyond = 1.0 - kept
 
     # Smooth the remainder, and add it again.
@@ -213,16 +212,14 @@ def redistribute_fireflies(
     return kept * color + smoothed, kept * kept * variance + smoothed_variance
 
 
-def firefly_weights(color: Any, *, width: int, height: int, times: float, rank: int = 1) -> Any:
-    """Factors that clamp the fireflies of an image to a multiple of their neighbours; Float.
+def firefly_weights(color: Any, *, width: int, height: int, rank: int = 1) -> Any:
+    """Factors that clamp the fireflies of an image to twice the luminance of a neighbour; Float.
 
     Parameters
     ----------
     color : Array3f
         Image, width * height lanes.
     width, height
-    times
-        Limit, in units of a neighbour's luminance.
     rank
         1 for the brightest neighbour, 2 for the second brightest.
     """
@@ -243,7 +240,7 @@ def firefly_weights(color: Any, *, width: int, height: int, times: float, rank: 
                     brightest[place], around = dr.maximum(other, around), dr.minimum(other, around)
 
     # Clamp.
-    limit = times * brightest[-1]
+    limit = FIREFLY * brightest[-1]
     return dr.select(luminance > limit, limit / dr.maximum(luminance, TINY), 1.0)
 
 
