@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from enfilade.camera.pinhole import Camera, look_at
+from enfilade.methods.decoupled import denoising
 from enfilade.methods.decoupled.denoising import denoise_light
+from enfilade.methods.denoise import denoise
 from enfilade.records import Shading
 from support.analytic_truth import geometry_of
 from support.example_scenes import wall
@@ -40,6 +42,31 @@ def test_a_difference_of_lobes_keeps_its_negative_light():
     assert found[:, :70].mean() == pytest.approx(1.0, rel=0.02)
     assert found[:, 90:].mean() == pytest.approx(-0.5, rel=0.02)
     assert found[:, 90:].std() < 0.1
+
+
+@pytest.mark.parametrize(("least", "runs"), [(-0.1, 1), (-10.0, 2)])
+def test_little_light_below_zero_is_accounted_for_without_the_denoiser(monkeypatch, least, runs):
+    light, done = noisy(2), []
+    monkeypatch.setattr(denoising, "denoise", lambda *args, **kw: (done.append(0), denoise(*args, **kw))[1])
+    light.color[40:44, 60:80] = least
+    found = denoised(light)
+    assert len(done) == runs
+    assert found.mean() == pytest.approx(light.color.mean(), abs=1e-3)
+
+
+@pytest.mark.parametrize(("columns", "runs"), [((10, 50), 1), ((10, 130), 2)])
+def test_regions_far_apart_are_denoised_apart(monkeypatch, columns, runs):
+    is_lit, sizes = np.zeros_like(WHERE), []
+    for first in columns:
+        is_lit[40:60, first : first + 20] = True
+    monkeypatch.setattr(
+        denoising, "denoise", lambda *a, **kw: (sizes.append(a[0].shape), denoise(*a, **kw))[1]
+    )
+    light = noisy(2)
+    found = denoised(Shading(light.color * is_lit[..., None], light.variance * is_lit), is_lit)
+    assert len(sizes) == runs
+    assert found[is_lit].mean() == pytest.approx(light.color[is_lit].mean(), rel=0.02)
+    assert found[is_lit].std() < 0.25 * light.color[is_lit].std()
 
 
 def test_one_outlier_does_not_tint_the_surface():

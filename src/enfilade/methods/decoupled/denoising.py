@@ -6,6 +6,7 @@ from typing import Any
 
 import drjit as dr
 import numpy as np
+import numpy.typing as npt
 import scipy.ndimage
 
 from enfilade.arrays import Array3f, Array4f, image, lanes
@@ -16,9 +17,11 @@ from enfilade.methods.denoise import denoise
 from enfilade.records import F32, Geometry, Mask, Shading
 
 MARGIN = 8  # pixels around those with light, which are denoised with them
+BLOCK = 32  # pixels: regions with no light over such a block between them are denoised apart
 EXTENSION, JITTER = 2.5, 1  # pixels: of guides beyond the sampled ones, and of the light there
 NOISE_SHARE = 0.25  # of the variance of irradiance: low-discrepancy samples have less noise than it tells
 OUTLIER = 64.0  # times the denoised irradiance: brighter estimates are limited where the mean is kept
+NEGLIGIBLE = 1e-3  # of the light: if less is below zero, the correction alone accounts for it
 LEVELS = 5  # of the wavelet that smooths the correction: 32 pixels to each side
 
 
@@ -111,16 +114,18 @@ def denoise_light(
     (H, W, 3) float32
     """
     # Denoise, light below zero apart.
+    most = np.float32(outlier)
     positive = np.maximum(light.color, np.float32(0))
     seen = positive if clamped is None else _without_fireflies(positive, clamped)
     above = _denoised(seen, geometry, where, quality, is_extended=is_extended)
-    below: F32 | np.float32 = np.float32(0)
-    if light.color.min() < 0.0:
-        below = _denoised(positive - light.color, geometry, where, quality, is_extended=is_extended)
+    negative, below = positive - light.color, np.zeros_like(above)
+    is_negligible = negative.sum(dtype=np.float64) <= NEGLIGIBLE * positive.sum(dtype=np.float64)
+    if not is_negligible:
+        below = _denoised(negative, geometry, where, quality, is_extended=is_extended)
 
     # Smooth the difference, and the luminance.
-    clean, lowest = above - below, -np.float32(outlier) * below
-    limited = np.clip(light.color, lowest, np.float32(outlier) * above)
+    clean = above - below
+    limited = np.clip(light.color, -most * (above if is_negligible else below), most * above)
     guide = guide_of(geometry, where)
     weights = Array3f(*REC709_LUMINANCE)
     luminance = dr.dot(lanes(above + below), weights)
@@ -138,7 +143,7 @@ def denoise_light(
     share = luminance / dr.maximum(smoothed.w, 1e-20)
     correction = difference * share * squared / dr.maximum(squared + variance, 1e-20)
     corrected = clean + np.where(where[..., None], image(correction, *where.shape), np.float32(0))
-    bounded: F32 = np.maximum(corrected, lowest)
+    bounded: F32 = np.maximum(corrected, -most * below)
     if is_excess_kept:
         excess = (light.color - limited).sum(axis=(0, 1), dtype=np.float64, where=where[..., None])
         total = np.maximum(bounded.sum(axis=(0, 1), dtype=np.float64, where=where[..., None]), 1e-20)
@@ -155,13 +160,13 @@ def _without_fireflies(color: F32, where: Mask) -> F32:
 
 
 def _denoised(color: F32, geometry: Geometry, where: Mask, quality: str, *, is_extended: bool) -> F32:
-    """Denoise the part of an image that has light; the guides are an albedo of one, and the normals.
+    """Denoise the regions of an image that have light; the guides are an albedo of one, and the normals.
 
     Pixels that were not sampled have light like the nearest ones that were: black would darken their edges.
     With `is_extended` those beside sampled ones have their normals, too.
     """
     clean = np.zeros_like(color)
-    for part in _bounding_box(np.any(color, axis=2)):
+    for part, own in _regions(np.any(color, axis=2)):
         distance, nearest = scipy.ndimage.distance_transform_edt(~where[part], return_indices=True)
         around = _jittered(distance.shape)
         light = np.where(
@@ -170,7 +175,8 @@ def _denoised(color: F32, geometry: Geometry, where: Mask, quality: str, *, is_e
         is_guided = (distance <= (EXTENSION if is_extended else 0.0))[..., None]
         normal = np.where(is_guided, geometry.normal[part][tuple(nearest)], np.float32(0))
         white = np.broadcast_to(is_guided, normal.shape).astype(np.float32)
-        clean[part] = denoise(light, white, normal, quality=quality)
+        denoised = denoise(light, white, normal, quality=quality)
+        clean[part] = np.where(own[..., None], denoised, clean[part])
     return clean
 
 
@@ -183,12 +189,27 @@ def _jittered(shape: tuple[int, ...]) -> tuple[Any, ...]:
     )
 
 
-def _bounding_box(mask: Mask) -> list[tuple[slice, slice]]:
-    """The smallest rectangle around a mask and its margin; none if it is empty."""
+def _regions(mask: Mask) -> list[tuple[tuple[slice, slice], Mask]]:
+    """The regions of a mask, far apart: rectangles around them with a margin, and their part of each.
+
+    All of the mask is one region where the rectangles overlap so much that they have more pixels.
+    """
+    starts = [np.arange(0, size, BLOCK) for size in mask.shape]
+    blocks = np.logical_or.reduceat(np.logical_or.reduceat(mask, starts[0], axis=0), starts[1], axis=1)
+    numbered, _ = scipy.ndimage.label(blocks, np.ones((3, 3)))
+    labels = numbered.repeat(BLOCK, axis=0).repeat(BLOCK, axis=1)[: mask.shape[0], : mask.shape[1]]
+    parts, whole = _rectangles(np.where(mask, labels, 0)), _rectangles(mask.astype(np.int32))
+    if sum(labels[part].size for part in parts) > sum(labels[part].size for part in whole):
+        return [(part, np.ones_like(mask[part])) for part in whole]
+    return [(part, np.isin(labels[part], (0, number))) for number, part in enumerate(parts, 1)]
+
+
+def _rectangles(labels: npt.NDArray[np.int32]) -> list[tuple[slice, slice]]:
+    """The smallest rectangles around numbered regions, and their margins."""
     return [
         (
             slice(max(rows.start - MARGIN, 0), rows.stop + MARGIN),
             slice(max(columns.start - MARGIN, 0), columns.stop + MARGIN),
         )
-        for rows, columns in scipy.ndimage.find_objects(mask.astype(np.int8))
+        for rows, columns in scipy.ndimage.find_objects(labels)
     ]
