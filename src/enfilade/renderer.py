@@ -200,6 +200,8 @@ class BsdfSample:
         Whether the lobe shows images: it is a delta lobe, or hardly wider.
     is_passed : Bool
         Whether this is such a null interaction.
+    is_within : Bool
+        Whether the path continues within a refractive medium: on the inner side of an interface.
     """
 
     rays: Rays
@@ -210,6 +212,7 @@ class BsdfSample:
     is_split: Any
     is_image: Any
     is_passed: Any
+    is_within: Any
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,11 +1,14 @@
 """Denoised irradiance: less noise, the same mean, and no surface tinted by one path."""
 
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
 
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.methods.decoupled import denoising
 from enfilade.methods.decoupled.denoising import denoise_light
+from enfilade.methods.decoupled.edges import dilated
 from enfilade.methods.denoise import denoise
 from enfilade.records import Shading
 from support.analytic_truth import geometry_of
@@ -46,27 +49,52 @@ def test_a_difference_of_lobes_keeps_its_negative_light():
 
 @pytest.mark.parametrize(("least", "runs"), [(-0.1, 1), (-10.0, 2)])
 def test_little_light_below_zero_is_accounted_for_without_the_denoiser(monkeypatch, least, runs):
-    light, done = noisy(2), []
-    monkeypatch.setattr(denoising, "denoise", lambda *args, **kw: (done.append(0), denoise(*args, **kw))[1])
-    light.color[40:44, 60:80] = least
+    denoiser = Mock(wraps=denoise)
+    monkeypatch.setattr(denoising, "denoise", denoiser)
+    light = noisy(2)
+    positive = denoised(light).sum()
+    light.color[40:44, 60:64] = least
+    light.color[40:44, 80:84] += 4.0  # so that no block is below zero
+    denoiser.reset_mock()
     found = denoised(light)
-    assert len(done) == runs
-    assert found.mean() == pytest.approx(light.color.mean(), abs=1e-3)
+    assert denoiser.call_count == runs
+    assert found.sum() - positive == pytest.approx(light.color.sum() - noisy(2).color.sum(), abs=50.0)
 
 
-@pytest.mark.parametrize(("columns", "runs"), [((10, 50), 1), ((10, 130), 2)])
-def test_regions_far_apart_are_denoised_apart(monkeypatch, columns, runs):
-    is_lit, sizes = np.zeros_like(WHERE), []
-    for first in columns:
-        is_lit[40:60, first : first + 20] = True
-    monkeypatch.setattr(
-        denoising, "denoise", lambda *a, **kw: (sizes.append(a[0].shape), denoise(*a, **kw))[1]
-    )
+def test_light_below_zero_alone_is_kept_beside_a_highlight():
+    light = noisy(2)
+    light.color[:, 96:] = -0.5
+    light.color[:10, :10] = 1e6
+    assert denoised(light)[20:, 110:].mean() == pytest.approx(-0.5, rel=0.02)
+
+
+def test_regions_far_apart_are_denoised_apart(monkeypatch):
+    denoiser = Mock(wraps=denoise)
+    monkeypatch.setattr(denoising, "denoise", denoiser)
+    is_lit = np.zeros_like(WHERE)
+    is_lit[40:60, 10:30] = is_lit[40:60, 130:150] = True
     light = noisy(2)
     found = denoised(Shading(light.color * is_lit[..., None], light.variance * is_lit), is_lit)
-    assert len(sizes) == runs
+    assert denoiser.call_count == 2
     assert found[is_lit].mean() == pytest.approx(light.color[is_lit].mean(), rel=0.02)
     assert found[is_lit].std() < 0.25 * light.color[is_lit].std()
+
+
+def test_regions_own_what_is_around_them():
+    spot, corner = np.zeros((2, 200, 200), np.bool_)
+    spot[10:20, 44:64] = corner[20:197, 190:197] = corner[190:197, 72:197] = True
+    regions = denoising._regions(spot | corner)
+    for (part, own), region, other in zip(regions, (spot, corner), (corner, spot), strict=True):
+        assert own[dilated(region, denoising.MARGIN)[part]].all()
+        assert not own[other[part]].any()
+
+
+def test_regions_that_overlap_are_one():
+    mask = np.zeros((200, 200), np.bool_)
+    mask[:, :8] = mask[192:, :] = mask[:100, 192:] = mask[60:120, 80:120] = True
+    ((part, own),) = denoising._regions(mask)
+    assert mask[part].shape == own.shape == mask.shape
+    assert own.all()
 
 
 def test_one_outlier_does_not_tint_the_surface():

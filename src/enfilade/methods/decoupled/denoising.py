@@ -17,11 +17,11 @@ from enfilade.methods.denoise import denoise
 from enfilade.records import F32, Geometry, Mask, Shading
 
 MARGIN = 8  # pixels around those with light, which are denoised with them
-BLOCK = 32  # pixels: regions with no light over such a block between them are denoised apart
+BLOCK = 32  # pixels: regions with a whole empty block of a grid between them are denoised apart
 EXTENSION, JITTER = 2.5, 1  # pixels: of guides beyond the sampled ones, and of the light there
 NOISE_SHARE = 0.25  # of the variance of irradiance: low-discrepancy samples have less noise than it tells
 OUTLIER = 64.0  # times the denoised irradiance: brighter estimates are limited where the mean is kept
-NEGLIGIBLE = 1e-3  # of the light: if less is below zero, the correction alone accounts for it
+NEGLIGIBLE = 1e-2  # of the light of a block: where less is below zero, the correction accounts for it
 LEVELS = 5  # of the wavelet that smooths the correction: 32 pixels to each side
 
 
@@ -57,12 +57,12 @@ def denoise_irradiance(
                 quality=quality,
                 outlier=outlier,
                 is_excess_kept=is_excess_kept,
-                clamped=narrow if layer is image.indirect else None,
+                clamped=clamped,
             ),
             np.zeros_like(layer.variance),
             layer.dropped,
         )
-        for layer in (image.direct, image.indirect)
+        for layer, clamped in ((image.direct, None), (image.indirect, narrow))
     )
     return IrradianceImage(direct, indirect, image.is_known)
 
@@ -86,8 +86,9 @@ def denoise_light(
     highlight does not brighten the dark surface around it. A highlight of a few pixels thus keeps some of its
     noise.
     Outliers are limited, so that no single path tints a surface. The denoiser takes no negative light, which
-    is denoised apart: specular lobes that are a difference have it, and so has indirect light behind
-    cut-outs and thin glass, where the expectation of what paths find by chance is subtracted.
+    is denoised apart where it is more than a hundredth of the light around: specular lobes that are a
+    difference have it, and so has indirect light behind cut-outs and thin glass, where the expectation of
+    what paths find by chance is subtracted.
 
     Parameters
     ----------
@@ -106,8 +107,9 @@ def denoise_light(
     is_extended
         Whether the guides of sampled pixels extend beyond them, so that the denoiser sees no edges there.
     clamped
-        Pixels, (H, W), whose fireflies are clamped for the denoiser: it leaves them on narrow surfaces. The
-        correction adds their light.
+        Pixels, (H, W), whose fireflies are clamped for the denoiser, which would keep them on narrow
+        surfaces; but not those with fewer than two neighbours that have light. The correction adds their
+        light, up to `outlier`.
 
     Returns
     -------
@@ -118,14 +120,14 @@ def denoise_light(
     positive = np.maximum(light.color, np.float32(0))
     seen = positive if clamped is None else _without_fireflies(positive, clamped)
     above = _denoised(seen, geometry, where, quality, is_extended=is_extended)
-    negative, below = positive - light.color, np.zeros_like(above)
-    is_negligible = negative.sum(dtype=np.float64) <= NEGLIGIBLE * positive.sum(dtype=np.float64)
-    if not is_negligible:
-        below = _denoised(negative, geometry, where, quality, is_extended=is_extended)
+    negative = positive - light.color
+    is_counted = _in_blocks(negative.sum(axis=2)) > NEGLIGIBLE * _in_blocks(positive.sum(axis=2))
+    negative[~_of_pixels(is_counted, where.shape)] = 0.0
+    below = _denoised(negative, geometry, where, quality, is_extended=is_extended)
 
     # Smooth the difference, and the luminance.
     clean = above - below
-    limited = np.clip(light.color, -most * (above if is_negligible else below), most * above)
+    limited = np.clip(light.color, -most * (above + below), most * above)
     guide = guide_of(geometry, where)
     weights = Array3f(*REC709_LUMINANCE)
     luminance = dr.dot(lanes(above + below), weights)
@@ -152,7 +154,7 @@ def denoise_light(
 
 
 def _without_fireflies(color: F32, where: Mask) -> F32:
-    """Light whose fireflies are clamped, but for pixels with less than two neighbours that have light."""
+    """Light whose fireflies are clamped, but for pixels with fewer than two neighbours that have light."""
     height, width = where.shape
     weights = image(firefly_weights(lanes(color), width=width, height=height, rank=2), height, width)
     clamped: F32 = color * np.where(where & (weights > 0.0), weights, np.float32(1))[..., None]
@@ -190,18 +192,28 @@ def _jittered(shape: tuple[int, ...]) -> tuple[Any, ...]:
 
 
 def _regions(mask: Mask) -> list[tuple[tuple[slice, slice], Mask]]:
-    """The regions of a mask, far apart: rectangles around them with a margin, and their part of each.
+    """Regions of a mask that are far apart: the rectangle around each, and the pixels of it that are its own.
 
-    All of the mask is one region where the rectangles overlap so much that they have more pixels.
+    It is one rectangle around all of them if theirs have more pixels in total.
     """
-    starts = [np.arange(0, size, BLOCK) for size in mask.shape]
-    blocks = np.logical_or.reduceat(np.logical_or.reduceat(mask, starts[0], axis=0), starts[1], axis=1)
-    numbered, _ = scipy.ndimage.label(blocks, np.ones((3, 3)))
-    labels = numbered.repeat(BLOCK, axis=0).repeat(BLOCK, axis=1)[: mask.shape[0], : mask.shape[1]]
-    parts, whole = _rectangles(np.where(mask, labels, 0)), _rectangles(mask.astype(np.int32))
+    blocks, _ = scipy.ndimage.label(_in_blocks(mask) > 0, np.ones((3, 3)))
+    labels = np.where(mask, _of_pixels(blocks, mask.shape), 0)
+    parts, whole = _rectangles(labels), _rectangles(mask.astype(np.int32))
     if sum(labels[part].size for part in parts) > sum(labels[part].size for part in whole):
         return [(part, np.ones_like(mask[part])) for part in whole]
-    return [(part, np.isin(labels[part], (0, number))) for number, part in enumerate(parts, 1)]
+    nearest = scipy.ndimage.maximum_filter(labels, 2 * MARGIN + 1)
+    return [(part, np.isin(nearest[part], (0, number))) for number, part in enumerate(parts, 1)]
+
+
+def _in_blocks(image: npt.NDArray[Any]) -> Any:
+    """Sums of an image, (H, W), over the blocks of a grid."""
+    rows, columns = (np.arange(0, size, BLOCK) for size in image.shape)
+    return np.add.reduceat(np.add.reduceat(image, rows, axis=0, dtype=np.float64), columns, axis=1)
+
+
+def _of_pixels(blocks: npt.NDArray[Any], shape: tuple[int, ...]) -> Any:
+    """Values of blocks at their pixels, (H, W)."""
+    return blocks.repeat(BLOCK, axis=0).repeat(BLOCK, axis=1)[: shape[0], : shape[1]]
 
 
 def _rectangles(labels: npt.NDArray[np.int32]) -> list[tuple[slice, slice]]:

@@ -17,7 +17,7 @@ from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from enfilade.methods.decoupled.path_depth import weight_after
 from enfilade.methods.decoupled.paths import Path
 from enfilade.methods.decoupled.surface_image import UploadedImage, lookup
-from enfilade.methods.decoupled.virtual_images import MAX_INTERFACES
+from enfilade.methods.decoupled.virtual_images import MAX_INTERFACES, cached_shape
 from enfilade.records import MIN_DIFFUSE_ALBEDO, SurfaceClass
 from enfilade.renderer import MAX_PATH_DEPTH, Branch, BsdfSample, LobeRenderer, ShadingPoint
 
@@ -144,7 +144,7 @@ class PathKernels:
         query = CacheQuery(
             position=point.position,
             normal=point.surfaces.normal,
-            shape_index=point.surfaces.shape_index,
+            shape_index=cached_shape(point.surfaces.shape_index, path.is_within),
             width=path.width_at(point),
             weight=dr.select(is_diffuse, path.throughput * albedo * self._lit(path), 0.0),
             depth=path.depth,
@@ -192,6 +192,7 @@ class PathKernels:
             bounces=path.bounces + dr.select(sample.is_image | sample.is_passed, UInt(1), BROAD_BOUNCES),
             depth=depth,
             branch=path.branch,
+            is_within=sample.is_within,
         )
 
         # Query the cache at the next vertex.
@@ -227,6 +228,7 @@ class PathKernels:
             bounces=path.bounces + 1,
             depth=path.depth + 1,
             branch=path.branch,
+            is_within=path.is_within,
         )
 
         # Query the view, and at once the hash grid, which has most of what the camera does not see.
@@ -248,8 +250,8 @@ class PathKernels:
             Whether a surface is diffuse, and in the images of the cache, or not.
         """
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
-        at = point.position, point.surfaces.normal, point.surfaces.shape_index
-        irradiance, is_known = cache.lookup(*at)
+        shape_index = cached_shape(point.surfaces.shape_index, path.is_within)
+        irradiance, is_known = cache.lookup(point.position, point.surfaces.normal, shape_index)
         is_diffuse = point.surfaces.is_hit & (dr.max(point.surfaces.albedo) > MIN_DIFFUSE_ALBEDO)
         is_diffuse &= path.is_active
         return (
@@ -306,7 +308,8 @@ def _surviving(path: Path, point: ShadingPoint) -> Any:
 
 def _keys(point: ShadingPoint, path: Path, count: int = LEVELS + 1) -> tuple[Any, ...]:
     """Keys of the entries of a point, each of twice the size of the one before."""
-    at = point.position, point.surfaces.normal, point.surfaces.shape_index, path.width_at(point)
+    shape_index = cached_shape(point.surfaces.shape_index, path.is_within)
+    at = point.position, point.surfaces.normal, shape_index, path.width_at(point)
     return tuple(entry_key(*at, level) for level in range(count))
 
 

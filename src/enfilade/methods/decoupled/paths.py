@@ -9,7 +9,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from enfilade.arrays import Array3f, Float, UInt, lanes, opaque
+from enfilade.arrays import Array3f, Bool, Float, UInt, lanes, opaque
 from enfilade.kernels.random import PaddedSobolSampler
 from enfilade.kernels.replay import padded
 from enfilade.renderer import Bounce, Branch, Rays, ShadingPoint
@@ -36,6 +36,8 @@ class Path:
         Those of them that count where the scene limits the depth of paths.
     branch : UInt
         :class:`Branch` that it follows at the next interface.
+    is_within : Bool
+        Whether it is within a refractive medium, which it entered by an interface.
     """
 
     lane: Any
@@ -48,6 +50,7 @@ class Path:
     bounces: Any
     depth: Any
     branch: Any
+    is_within: Any
 
     @property
     def is_active(self) -> Any:
@@ -78,6 +81,7 @@ def spawn(rays: Rays, sampler: Any, spread: float) -> Path:
         bounces=dr.opaque(UInt, 0, count),
         depth=dr.opaque(UInt, 0, count),
         branch=dr.opaque(UInt, int(Branch.REFLECTED), count),
+        is_within=dr.opaque(Bool, False, count),
     )
     # Evaluate now: memory shared with NumPy can't be freed while a kernel is recorded.
     dr.eval(path)
@@ -100,6 +104,7 @@ def compact(path: Path, chosen: Any) -> Path:
         bounces=dr.gather(UInt, path.bounces, index),
         depth=dr.gather(UInt, path.depth, index),
         branch=dr.gather(UInt, path.branch, index),
+        is_within=dr.gather(Bool, path.is_within, index),
     )
     dr.make_opaque(taken)  # a literal would be another signature of the kernels
     return taken

@@ -21,7 +21,7 @@ from enfilade.methods.decoupled.hash_grid import LEVELS
 from enfilade.methods.decoupled.hash_grid_entries import Entries
 from enfilade.methods.decoupled.paths import Path
 from enfilade.methods.decoupled.shot import ShotContext
-from enfilade.methods.decoupled.virtual_images import CHOICES, IN_VIRTUAL_IMAGE
+from enfilade.methods.decoupled.virtual_images import CHOICES, IN_VIRTUAL_IMAGE, WITHIN
 from enfilade.records import Geometry, Shading
 from enfilade.renderer import Purpose, Rays
 
@@ -89,14 +89,19 @@ def _trace(shot: ShotContext, frame: int, virtual: Geometry, choice: float) -> t
     if (denoiser := shot.settings.denoiser) != "none":
         # Virtual images do not lie in the planes that their depths and normals describe.
         guide = replace(virtual, depth=np.zeros_like(virtual.depth))
+        is_within = (virtual.shape_index & WITHIN) > 0
         for layer, shading in enumerate(estimate.shadings):
             variance = np.float32(NOISE_SHARE) * shading.variance
             light, is_shown = Shading(shading.color, variance).to_image(is_traced), is_traced.copy()
             if layer == 0:  # what the prepass images show is black among these; they have all light
                 is_shown.flat[known_pixels] = True
                 light.color.reshape(-1, 3)[known_pixels] = known_irradiance
-            denoised = denoise_light(guide, light, is_shown, quality=denoiser, outlier=OUTLIER)
-            layers[layer] = denoised[is_traced]
+            for part in (is_within, ~is_within):  # apart, since the denoiser would mix them
+                pixels_of = is_traced & part
+                if pixels_of.any():
+                    own = Shading(light.color * part[..., None], light.variance * part)
+                    found = denoise_light(guide, own, is_shown & part, quality=denoiser, outlier=OUTLIER)
+                    layers[layer][part[is_traced]] = found[pixels_of]
         times = DENOISED_SAMPLES
     irradiance = np.hstack(layers)
 

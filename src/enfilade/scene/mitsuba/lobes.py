@@ -82,6 +82,9 @@ class Lobes:
             bsdf_table(scene, lambda bsdf: registry_index(mi.BSDFPtr(base(bsdf, is_front=False))), UInt),
         )
         self._turned = bsdf_table(scene, is_turned)
+        self._solid = bsdf_table(
+            scene, lambda bsdf: bsdf.class_name() == "SmoothDielectric" or rough_ior(bsdf) > 0.0
+        )
         self._clear = bsdf_table(scene, lambda bsdf: bsdf.class_name() in CLEAR)
         self._rough_ior = bsdf_table(scene, rough_ior, Float)
         self._narrow = bsdf_table(scene, is_narrow)
@@ -98,7 +101,14 @@ class Lobes:
     def state(self) -> Any:
         """Arrays that the methods read, but for that of `specular_albedo`."""
         albedos = self._bases, self._turned, self._masked
-        interfaces = self._clear, self._rough_ior, self._narrow, self._coated, self._textured_metal
+        interfaces = (
+            self._clear,
+            self._solid,
+            self._rough_ior,
+            self._narrow,
+            self._coated,
+            self._textured_metal,
+        )
         return self._whole, self._lambertian, self._sides, self._mixed, interfaces, albedos
 
     def has_specular(self, si: Any, bsdf: Any) -> Any:
@@ -211,6 +221,10 @@ class Lobes:
     def is_clear(self, si: Any, bsdf: Any) -> Any:
         """Whether a BSDF is a clear interface: it reflects or transmits, in one direction each."""
         return _of(self._clear, si, bsdf)
+
+    def is_solid(self, si: Any, bsdf: Any) -> Any:
+        """Whether a BSDF is an interface with a refractive medium on its inner side."""
+        return _of(self._solid, si, bsdf)
 
     def is_rough_interface(self, si: Any, bsdf: Any) -> Any:
         """Whether a BSDF is a rough interface: it reflects or transmits, by one lobe each."""

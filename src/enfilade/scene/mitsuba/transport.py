@@ -187,6 +187,7 @@ class LightTransport:
             is_split=Bool(False),
             is_image=Bool(False),
             is_passed=Bool(False),
+            is_within=Bool(False),
         )
 
     def _guided(
@@ -245,6 +246,7 @@ class LightTransport:
             is_split=Bool(point.has_specular & is_split & (branch is not None)),
             is_image=Bool(is_delta | self._lobes.is_narrow(si, bsdf)),
             is_passed=is_passed,
+            is_within=Bool(self._lobes.is_solid(si, bsdf) & (wo.z < 0.0)),
         )
 
     def _next_event(
