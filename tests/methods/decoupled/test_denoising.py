@@ -47,18 +47,19 @@ def test_a_difference_of_lobes_keeps_its_negative_light():
     assert found[:, 90:].std() < 0.1
 
 
-@pytest.mark.parametrize(("least", "runs"), [(-0.1, 1), (-10.0, 2)])
-def test_little_light_below_zero_is_accounted_for_without_the_denoiser(monkeypatch, least, runs):
+@pytest.mark.parametrize(("least", "runs"), [(-0.5, 1), (-10.0, 2)])
+def test_light_below_zero_is_accounted_for_by_the_denoiser_or_the_correction(monkeypatch, least, runs):
     denoiser = Mock(wraps=denoise)
     monkeypatch.setattr(denoising, "denoise", denoiser)
     light = noisy(2)
-    positive = denoised(light).sum()
+    light.variance[:] = 0.0  # as in the prepass: all that the denoiser leaves out is added again
+    light.color[40:44, 60:64] = 0.0
+    without = denoised(light)
     light.color[40:44, 60:64] = least
-    light.color[40:44, 80:84] += 4.0  # so that no block is below zero
     denoiser.reset_mock()
     found = denoised(light)
     assert denoiser.call_count == runs
-    assert found.sum() - positive == pytest.approx(light.color.sum() - noisy(2).color.sum(), abs=50.0)
+    assert (found - without).sum() == pytest.approx(light.color[40:44, 60:64].sum(), rel=0.2)
 
 
 def test_light_below_zero_alone_is_kept_beside_a_highlight():
@@ -113,9 +114,8 @@ def test_an_outlier_on_a_narrow_surface_leaves_no_dot():
     light = noisy(2)
     light.color[60, 80] = 1e4
     light.variance[60, 80] = 1e8
-    clamped, unclamped = (denoised(light, is_narrow, clamped=where) for where in (is_narrow, None))
-    assert unclamped[is_narrow].max() > 10.0
-    assert clamped[is_narrow].max() < 2.0
+    # 1.7; 4594 where the denoiser got it as it is.
+    assert denoised(light, is_narrow, clamped=is_narrow)[is_narrow].max() < 2.0
 
 
 def test_pixels_without_neighbours_are_not_clamped():

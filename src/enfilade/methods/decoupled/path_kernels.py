@@ -17,7 +17,7 @@ from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from enfilade.methods.decoupled.path_depth import weight_after
 from enfilade.methods.decoupled.paths import Path
 from enfilade.methods.decoupled.surface_image import UploadedImage, lookup
-from enfilade.methods.decoupled.virtual_images import MAX_INTERFACES, cached_shape
+from enfilade.methods.decoupled.virtual_images import MAX_INTERFACES
 from enfilade.records import MIN_DIFFUSE_ALBEDO, SurfaceClass
 from enfilade.renderer import MAX_PATH_DEPTH, Branch, BsdfSample, LobeRenderer, ShadingPoint
 
@@ -144,7 +144,7 @@ class PathKernels:
         query = CacheQuery(
             position=point.position,
             normal=point.surfaces.normal,
-            shape_index=cached_shape(point.surfaces.shape_index, path.is_within),
+            shape_index=path.shape_at(point.surfaces),
             width=path.width_at(point),
             weight=dr.select(is_diffuse, path.throughput * albedo * self._lit(path), 0.0),
             depth=path.depth,
@@ -250,8 +250,8 @@ class PathKernels:
             Whether a surface is diffuse, and in the images of the cache, or not.
         """
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
-        shape_index = cached_shape(point.surfaces.shape_index, path.is_within)
-        irradiance, is_known = cache.lookup(point.position, point.surfaces.normal, shape_index)
+        at = point.position, point.surfaces.normal, path.shape_at(point.surfaces)
+        irradiance, is_known = cache.lookup(*at)
         is_diffuse = point.surfaces.is_hit & (dr.max(point.surfaces.albedo) > MIN_DIFFUSE_ALBEDO)
         is_diffuse &= path.is_active
         return (
@@ -308,8 +308,7 @@ def _surviving(path: Path, point: ShadingPoint) -> Any:
 
 def _keys(point: ShadingPoint, path: Path, count: int = LEVELS + 1) -> tuple[Any, ...]:
     """Keys of the entries of a point, each of twice the size of the one before."""
-    shape_index = cached_shape(point.surfaces.shape_index, path.is_within)
-    at = point.position, point.surfaces.normal, shape_index, path.width_at(point)
+    at = point.position, point.surfaces.normal, path.shape_at(point.surfaces), path.width_at(point)
     return tuple(entry_key(*at, level) for level in range(count))
 
 

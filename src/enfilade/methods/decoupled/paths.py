@@ -12,7 +12,9 @@ import numpy as np
 from enfilade.arrays import Array3f, Bool, Float, UInt, lanes, opaque
 from enfilade.kernels.random import PaddedSobolSampler
 from enfilade.kernels.replay import padded
-from enfilade.renderer import Bounce, Branch, Rays, ShadingPoint
+from enfilade.renderer import Bounce, Branch, Rays, ShadingPoint, Surfaces
+
+WITHIN = 1 << 29  # added to the index of shapes within glass, such as the floor below a block
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,10 @@ class Path:
     def width_at(self, point: ShadingPoint) -> Any:
         """Width of the path where it meets a surface, scene units; Float."""
         return self.width + self.spread * point.surfaces.distance * dr.norm(self.rays.direction)
+
+    def shape_at(self, surfaces: Surfaces) -> Any:
+        """Shape indices of surfaces in the cache, UInt: within glass they have other light than beside it."""
+        return surfaces.shape_index + dr.select(self.is_within, UInt(WITHIN), UInt(0))
 
     def on_branch(self, branch: Branch) -> Path:
         """The same paths on a branch."""

@@ -21,7 +21,6 @@ from enfilade.records import Geometry, SurfaceClass
 from enfilade.renderer import LobeRenderer
 
 IN_VIRTUAL_IMAGE = np.uint32(1 << 30)  # added to the index of shapes seen in mirrors or through glass
-WITHIN = np.uint32(1 << 29)  # added to the index of shapes within glass, such as the floor below a block
 CLEAR = SurfaceClass.TRANSPARENT
 IMAGING = (SurfaceClass.MIRROR, CLEAR)
 SKY_DISTANCE = 1e4  # of the sky seen in a mirror, in distances of the mirror
@@ -158,7 +157,7 @@ class VirtualImages:
         forms_image &= surfaces.surface != int(SurfaceClass.EMISSIVE)  # mirrors show lamps
         for kind in IMAGING:
             forms_image |= surfaces.surface == int(kind)
-        shape_index = dr.select(surfaces.is_hit, cached_shape(surfaces.shape_index, ahead.is_within), 0)
+        shape_index = dr.select(surfaces.is_hit, ahead.shape_at(surfaces), 0)
         # Give the sky a single normal, so that the filter treats it as one surface.
         normal = dr.select(surfaces.is_hit, surfaces.normal, Array3f(0.0, 0.0, 1.0))
         is_image = sample.is_alive & sample.is_image
@@ -171,8 +170,3 @@ class VirtualImages:
             Bool(is_image),
             Bool(forms_image),
         )
-
-
-def cached_shape(shape_index: Any, is_within: Any) -> Any:
-    """Shape index of a surface in the cache, UInt: within glass it has other light than beside it."""
-    return shape_index + dr.select(is_within, UInt(int(WITHIN)), UInt(0))

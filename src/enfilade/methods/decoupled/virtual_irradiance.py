@@ -19,9 +19,9 @@ from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.methods.decoupled.denoising import NOISE_SHARE, OUTLIER, denoise_light
 from enfilade.methods.decoupled.hash_grid import LEVELS
 from enfilade.methods.decoupled.hash_grid_entries import Entries
-from enfilade.methods.decoupled.paths import Path
+from enfilade.methods.decoupled.paths import WITHIN, Path
 from enfilade.methods.decoupled.shot import ShotContext
-from enfilade.methods.decoupled.virtual_images import CHOICES, IN_VIRTUAL_IMAGE, WITHIN
+from enfilade.methods.decoupled.virtual_images import CHOICES, IN_VIRTUAL_IMAGE
 from enfilade.records import Geometry, Shading
 from enfilade.renderer import Purpose, Rays
 
