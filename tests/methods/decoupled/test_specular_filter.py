@@ -1,5 +1,7 @@
 """The spatial filter of specular AOVs: less noise, the same energy."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.ndimage import minimum_filter
@@ -8,7 +10,7 @@ from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry
 from enfilade.methods.decoupled.specular_filter import DENOISED_SHARE, filter_spatially
 from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE, VirtualImages
-from enfilade.records import Shading
+from enfilade.records import Shading, SurfaceClass
 from support.analytic_truth import geometry_of
 from support.example_scenes import wall
 from support.material_scene import front_camera, opened_scene, pane, specular_aovs
@@ -34,6 +36,22 @@ def test_thin_regions_are_smoothed_and_keep_their_energy(denoiser):
     (found,) = filter_spatially([geometry], [band], where, is_denoised=denoiser != "none", unit=1.0)
     assert found.color[where].std() < 0.5 * light[where].std()
     assert found.color[where].mean() == pytest.approx(light[where].mean(), rel=0.15)
+
+
+def test_specular_surfaces_do_not_lose_light_to_the_pixels_beside_them():
+    """A mirror beside a wall, whose next pixels are sampled, too. A third was lost at the edge."""
+    geometry = geometry_of(wall(), Camera(look_at((0, 0, 4), (0, 0, 0)), 45, 160, 60))
+    is_mirror = np.arange(60)[:, None] < 30
+    surface = np.where(is_mirror, SurfaceClass.MIRROR, SurfaceClass.DIFFUSE).repeat(160, axis=1)
+    geometry = replace(geometry, surface=surface.astype(np.uint8))
+    noise = np.random.default_rng(5).gamma(1.0, 1.0, (60, 160)).astype(np.float32) * is_mirror
+    aov = Shading(noise[..., None].repeat(3, axis=2), np.square(noise))
+    where = np.zeros((60, 160), bool)
+    where[:31] = True
+    (found,) = filter_spatially([geometry], [aov], where, is_denoised=True, unit=1.0)
+    rows = found.color.mean(axis=(1, 2), dtype=float)
+    np.testing.assert_allclose(rows[20:30], noise[20:30].mean(), rtol=0.15)
+    assert not rows[30:].any()
 
 
 def test_deviations_are_the_same_at_the_border_of_the_sampled_pixels():

@@ -18,7 +18,6 @@ from enfilade.records import F32, Geometry, Mask, Shading
 
 MARGIN = 8  # pixels around those with light, which are denoised with them
 BLOCK = 32  # pixels: regions with a whole empty block of a grid between them are denoised apart
-EXTENSION, JITTER = 2.5, 1  # pixels: of guides beyond the sampled ones, and of the light there
 NOISE_SHARE = 0.25  # of the variance of irradiance: low-discrepancy samples have less noise than it tells
 OUTLIER = 64.0  # times the denoised irradiance: brighter estimates are limited where the mean is kept
 NEGLIGIBLE = 1e-2  # of the light of a block: where less is below zero, the correction accounts for it
@@ -75,7 +74,7 @@ def denoise_light(
     quality: str,
     outlier: float,
     is_excess_kept: bool = False,
-    is_extended: bool = False,
+    is_mirrored: bool = True,
     clamped: Mask | None = None,
 ) -> F32:
     """Denoise light with normals as guides, and keep its mean along surfaces.
@@ -104,8 +103,9 @@ def denoise_light(
         Limit of the input of the correction, in units of the denoised value.
     is_excess_kept
         Whether light beyond that limit is distributed over the whole image, in proportion to the light there.
-    is_extended
-        Whether the guides of sampled pixels extend beyond them, so that the denoiser sees no edges there.
+    is_mirrored
+        Whether pixels are centres of surfaces, which the denoiser sees mirrored where none were sampled. If
+        they are averages over pixels, those at boundaries have less light, and are copied.
     clamped
         Pixels, (H, W), whose fireflies are clamped for the denoiser, which would keep them on narrow
         surfaces; but not those with fewer than two neighbours that have light. The correction adds their
@@ -114,16 +114,17 @@ def denoise_light(
     Returns
     -------
     (H, W, 3) float32
+        0 where no pixels were sampled.
     """
     # Denoise, light below zero apart.
     most = np.float32(outlier)
     positive = np.maximum(light.color, np.float32(0))
     seen = positive if clamped is None else _without_fireflies(positive, clamped)
-    above = _denoised(seen, geometry, where, quality, is_extended=is_extended)
+    above = _denoised(seen, geometry, where, quality, is_mirrored=is_mirrored)
     negative = positive - light.color
     is_counted = _in_blocks(negative.sum(axis=2)) > NEGLIGIBLE * _in_blocks(positive.sum(axis=2))
     negative[~_of_pixels(is_counted, where.shape)] = 0.0
-    below = _denoised(negative, geometry, where, quality, is_extended=is_extended)
+    below = _denoised(negative, geometry, where, quality, is_mirrored=is_mirrored)
 
     # Smooth the difference, and the luminance.
     clean = above - below
@@ -144,7 +145,7 @@ def denoise_light(
     squared = dr.square(dr.dot(difference, weights))
     share = luminance / dr.maximum(smoothed.w, 1e-20)
     correction = difference * share * squared / dr.maximum(squared + variance, 1e-20)
-    corrected = clean + np.where(where[..., None], image(correction, *where.shape), np.float32(0))
+    corrected = np.where(where[..., None], clean + image(correction, *where.shape), np.float32(0))
     bounded: F32 = np.maximum(corrected, -most * below)
     if is_excess_kept:
         excess = (light.color - limited).sum(axis=(0, 1), dtype=np.float64, where=where[..., None])
@@ -161,34 +162,32 @@ def _without_fireflies(color: F32, where: Mask) -> F32:
     return clamped
 
 
-def _denoised(color: F32, geometry: Geometry, where: Mask, quality: str, *, is_extended: bool) -> F32:
+def _denoised(color: F32, geometry: Geometry, where: Mask, quality: str, *, is_mirrored: bool) -> F32:
     """Denoise the regions of an image that have light; the guides are an albedo of one, and the normals.
 
-    Pixels that were not sampled have light like the nearest ones that were: black would darken their edges.
-    With `is_extended` those beside sampled ones have their normals, too.
+    Where no pixels were sampled, light and guides go on: black, or an edge of the guides, would darken the
+    surfaces there.
     """
     clean = np.zeros_like(color)
     for part, own in _regions(np.any(color, axis=2)):
-        distance, nearest = scipy.ndimage.distance_transform_edt(~where[part], return_indices=True)
-        around = _jittered(distance.shape)
-        light = np.where(
-            where[part][..., None], color[part], color[part][tuple(of[around] for of in nearest)]
-        )
-        is_guided = (distance <= (EXTENSION if is_extended else 0.0))[..., None]
-        normal = np.where(is_guided, geometry.normal[part][tuple(nearest)], np.float32(0))
-        white = np.broadcast_to(is_guided, normal.shape).astype(np.float32)
-        denoised = denoise(light, white, normal, quality=quality)
+        source = _continued(where[part], is_mirrored=is_mirrored)
+        light, normal = color[part][source], geometry.normal[part][source]
+        denoised = denoise(light, np.ones_like(light), normal, quality=quality)
         clean[part] = np.where(own[..., None], denoised, clean[part])
     return clean
 
 
-def _jittered(shape: tuple[int, ...]) -> tuple[Any, ...]:
-    """Rows and columns of a pixel near each: copies of single pixels would be streaks."""
-    random, jitter = np.random.default_rng(0), range(-JITTER, JITTER + 1)
-    return tuple(
-        np.clip(of + random.choice(jitter, shape), 0, size - 1)
-        for of, size in zip(np.indices(shape), shape, strict=True)
-    )
+def _continued(where: Mask, *, is_mirrored: bool) -> tuple[Any, ...]:
+    """Rows and columns of sampled pixels: of each itself, of others one at the boundary, or mirrored in it.
+
+    They are jittered by up to the distance to the boundary: copies of single pixels would be streaks, and the
+    noise of a narrow region, mirrored in both of its boundaries, would have a period.
+    """
+    here, last = np.indices(where.shape), np.reshape(where.shape, (2, 1, 1)) - 1
+    distance, nearest = scipy.ndimage.distance_transform_edt(~where, return_indices=True)
+    jitter = np.rint(distance * np.random.default_rng(0).uniform(-1.0, 1.0, here.shape)).astype(np.int32)
+    beyond = np.clip((2 * nearest - here if is_mirrored else here) + jitter, 0, last)
+    return tuple(nearest[:, *beyond])
 
 
 def _regions(mask: Mask) -> list[tuple[tuple[slice, slice], Mask]]:

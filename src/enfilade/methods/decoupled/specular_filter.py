@@ -97,7 +97,9 @@ def upload_aovs(geometry: Geometry, aovs: Sequence[SpecularAov], count: int, whe
 
 def _denoised(geometry: Geometry, aov: Shading, where: Mask, unit: float) -> SpecularAov:
     """Denoise an AOV, guided by the surfaces that are seen in it."""
-    color = denoise_light(geometry, aov, where, quality=DENOISER, outlier=OUTLIER, is_extended=True)
+    # Beside specular surfaces are others that were sampled, too, and found to have none of it.
+    is_shown = where & (geometry.is_specular | aov.color.any(axis=2))
+    color = denoise_light(geometry, aov, is_shown, quality=DENOISER, outlier=OUTLIER, is_mirrored=False)
     # Average the deviation over the sampled pixels.
     deviation, share = (
         scipy.ndimage.uniform_filter(of, DENOISED_SUPPORT)
