@@ -183,11 +183,13 @@ def _continued(where: Mask, *, is_mirrored: bool) -> tuple[Any, ...]:
     They are jittered by up to the distance to the boundary: copies of single pixels would be streaks, and the
     noise of a narrow region, mirrored in both of its boundaries, would have a period.
     """
-    here, last = np.indices(where.shape), np.reshape(where.shape, (2, 1, 1)) - 1
-    distance, nearest = scipy.ndimage.distance_transform_edt(~where, return_indices=True)
-    jitter = np.rint(distance * np.random.default_rng(0).uniform(-1.0, 1.0, here.shape)).astype(np.int32)
-    beyond = np.clip((2 * nearest - here if is_mirrored else here) + jitter, 0, last)
-    return tuple(nearest[:, *beyond])
+    source, missing = np.indices(where.shape, np.int32), ~where
+    distance, nearest = scipy.ndimage.distance_transform_edt(missing, return_indices=True)
+    here, boundary, reach = source[:, missing], nearest[:, missing], distance[missing]
+    jitter = np.rint(reach * np.random.default_rng(0).uniform(-1.0, 1.0, here.shape)).astype(np.int32)
+    beyond = (2 * boundary - here if is_mirrored else here) + jitter
+    source[:, missing] = nearest[:, *np.clip(beyond, 0, np.reshape(where.shape, (2, 1)) - 1)]
+    return tuple(source)
 
 
 def _regions(mask: Mask) -> list[tuple[tuple[slice, slice], Mask]]:
