@@ -13,7 +13,10 @@ import numpy as np
 from enfilade.arrays import lanes
 from enfilade.errors import SceneError
 from enfilade.resource_limits import is_out_of_memory
+from enfilade.scene.mitsuba.bsdfs import classes
 from enfilade.scene.mitsuba.files import fingerprint, reason
+
+SHEAR = 1e-4  # of UV maps below bump maps: V rises by a ten-thousandth of U
 
 
 def load_scene(file: Path) -> Any:
@@ -49,6 +52,7 @@ def load_scene(file: Path) -> Any:
     if not scene.shapes():
         raise SceneError(f"{file} has no shapes: there is nothing to render")
     _check_content(file, scene)
+    _shear_bump_maps(scene)
     if not scene.emitters():
         raise SceneError(
             f"{file} has no light, every frame would be black: add an <emitter>; or, in Blender, a lamp or a "
@@ -120,3 +124,20 @@ def _check_finite(file: Path, name: str, values: Any) -> None:
             f"{file}: an image{owner} has {is_bad.sum()} values that are NaN or infinite, first in row "
             f"{row}, column {column} of {width}x{height}; mend it"
         )
+
+
+def _shear_bump_maps(scene: Any) -> None:
+    """Shear the UV maps of meshes with bump maps, by less than can be seen.
+
+    Where the height is constant and the U axis is parallel to the z axis of the world, Mitsuba 3.9.1
+    evaluates the BSDF to NaN: it makes a tangent in the world orthogonal to a normal in the shading frame.
+    """
+    for mesh in mi.traverse(scene).hierarchy:
+        if not isinstance(mesh, mi.Mesh) or "BumpMap" not in classes(mesh.bsdf()):
+            continue
+        parameters = mi.traverse(mesh)
+        if "vertex_texcoords" in parameters:  # not of a rectangle
+            uv = np.array(parameters["vertex_texcoords"]).reshape(-1, 2)
+            uv[:, 1] += SHEAR * uv[:, 0]
+            parameters["vertex_texcoords"] = lanes(uv.ravel())
+            parameters.update()
