@@ -114,7 +114,7 @@ def test_an_outlier_on_a_narrow_surface_leaves_no_dot():
     light = noisy(2)
     light.color[60, 80] = 1e4
     light.variance[60, 80] = 1e8
-    # 1.7; 4594 where the denoiser got it as it is.
+    # 1.2; 2548 where the denoiser gets it as it is.
     assert denoised(light, is_narrow, clamped=is_narrow)[is_narrow].max() < 2.0
 
 
@@ -163,7 +163,7 @@ def test_pixels_without_irradiance_stay_black():
     known = Shading(light.color * where[..., None], light.variance * where)
     found = denoised(known, where)
     assert found[where].mean() == pytest.approx(1.0, rel=0.03)
-    assert found[:, :70].max() < 0.05
+    assert not found[~where].any()
 
 
 @pytest.mark.parametrize("chance", [2, 20])
@@ -177,27 +177,27 @@ def test_surfaces_are_not_darker_beside_pixels_without_light(chance):
     light.variance[~where] = 0.0
     found = denoised(light, where)
     is_beside = (distance > 18) & (distance < 20)
-    assert found[is_beside].mean() == pytest.approx(light.color[is_beside].mean(), rel=0.08)
+    assert found[is_beside].mean() == pytest.approx(light.color[where].mean(), rel=0.08)
     assert not found[~where].any()
 
 
-@pytest.mark.parametrize("width", [6, 40])
-def test_light_is_even_up_to_pixels_without_light(width):
-    """The outermost pixels had 0.74 to 1.16 of their light, and twice the noise of the others."""
+@pytest.mark.parametrize(("width", "noise"), [(6, 0.2), (40, 0.07)])
+def test_light_is_even_up_to_pixels_without_light(width, noise):
+    """The outermost pixels had 0.74 to 0.90 of their light, and all of them had twice the noise."""
     where = np.zeros_like(WHERE)
     where[40 : 40 + width] = True
     light = noisy(20)
     band = Shading(light.color * where[..., None], light.variance * where)
     rows = denoised(band, where)[where].reshape(width, -1) / light.color[where].mean()
     np.testing.assert_allclose(rows.mean(axis=1), 1.0, atol=0.05)
-    assert rows.std() < 0.2
+    assert rows.std() < noise
 
 
 def test_averages_over_pixels_keep_less_light_at_a_boundary():
-    """Half of it. Mirrored, the boundary would be a dark line in a surface, which is taken for noise."""
+    """Pixels that are half covered keep half of the light; mirrored, a denoiser takes them for noise."""
     where, covered = np.zeros_like(WHERE), np.zeros(WHERE.shape, np.float32)
     where[40:80], covered[41:79], covered[[40, 79]] = True, 1.0, 0.5
     light = noisy(8)
     band = Shading(light.color * covered[..., None], light.variance * np.square(covered))
     found = denoised(band, where, quality="fast", is_mirrored=False)
-    assert found[[40, 79]].mean() == pytest.approx(0.5, abs=0.2)
+    assert found[[40, 79]].mean() == pytest.approx(0.5, abs=0.2)  # 0.65; 0.98 if mirrored

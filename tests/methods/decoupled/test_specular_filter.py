@@ -38,20 +38,24 @@ def test_thin_regions_are_smoothed_and_keep_their_energy(denoiser):
     assert found.color[where].mean() == pytest.approx(light[where].mean(), rel=0.15)
 
 
-def test_specular_surfaces_do_not_lose_light_to_the_pixels_beside_them():
-    """A mirror beside a wall, whose next pixels are sampled, too. A third was lost at the edge."""
+@pytest.mark.parametrize("beside", [SurfaceClass.DIFFUSE, SurfaceClass.GLOSSY])
+def test_panes_do_not_lose_light_to_the_pixels_beside_them(beside):
+    """Those next to a pane are sampled, too. The last row of the pane lost a third of its light to them."""
     geometry = geometry_of(wall(), Camera(look_at((0, 0, 4), (0, 0, 0)), 45, 160, 60))
-    is_mirror = np.arange(60)[:, None] < 30
-    surface = np.where(is_mirror, SurfaceClass.MIRROR, SurfaceClass.DIFFUSE).repeat(160, axis=1)
-    geometry = replace(geometry, surface=surface.astype(np.uint8))
-    noise = np.random.default_rng(5).gamma(1.0, 1.0, (60, 160)).astype(np.float32) * is_mirror
-    aov = Shading(noise[..., None].repeat(3, axis=2), np.square(noise))
-    where = np.zeros((60, 160), bool)
-    where[:31] = True
-    (found,) = filter_spatially([geometry], [aov], where, is_denoised=True, unit=1.0)
-    rows = found.color.mean(axis=(1, 2), dtype=float)
+    is_pane = (np.arange(60)[:, None] < 30).repeat(160, axis=1)
+    surface = np.where(is_pane, SurfaceClass.TRANSPARENT, beside).astype(np.uint8)
+    within = np.where(is_pane, IN_VIRTUAL_IMAGE + 1, geometry.shape_index).astype(np.uint32)
+    virtual = [replace(geometry, surface=surface, shape_index=within)] * 2
+    where = np.ones(is_pane.shape, bool)
+    if beside == SurfaceClass.DIFFUSE:
+        where[31:] = False
+    noise = np.random.default_rng(5).gamma(1.0, 1.0, is_pane.shape).astype(np.float32) * is_pane
+    aov = Shading(noise[..., None].repeat(3, axis=2), is_pane.astype(np.float32))
+    transmission = filter_spatially(virtual, [aov, aov], where, is_denoised=True, unit=1.0)[1]
+    rows = transmission.color.mean(axis=(1, 2), dtype=float)
     np.testing.assert_allclose(rows[20:30], noise[20:30].mean(), rtol=0.15)
     assert not rows[30:].any()
+    np.testing.assert_allclose(transmission.deviation[:30], DENOISED_SHARE, rtol=2e-3)
 
 
 def test_deviations_are_the_same_at_the_border_of_the_sampled_pixels():

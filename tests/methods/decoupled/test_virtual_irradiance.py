@@ -171,7 +171,7 @@ def test_lookups_between_the_centres_of_pixels_find_the_light_of_virtual_images(
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 2])
 def test_light_behind_slabs_is_smooth(tmp_path, count):
-    """Each has two interfaces. 0.010 and 0.013; it was 0.07 and 0.03.
+    """Each has two interfaces. 0.008 and 0.009; it was 0.07 and 0.03.
 
     The smallest entries of the hash grid alone were filled, and behind more than three interfaces paths were
     traced to their end.

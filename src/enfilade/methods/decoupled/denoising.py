@@ -104,8 +104,8 @@ def denoise_light(
     is_excess_kept
         Whether light beyond that limit is distributed over the whole image, in proportion to the light there.
     is_mirrored
-        Whether pixels are centres of surfaces, which the denoiser sees mirrored where none were sampled. If
-        they are averages over pixels, those at boundaries have less light, and are copied.
+        Whether the light is that at pixels' centres: where no pixels were sampled, the denoiser sees it
+        mirrored. Averages over pixels, which have less light at a boundary, are copied.
     clamped
         Pixels, (H, W), whose fireflies are clamped for the denoiser, which would keep them on narrow
         surfaces; but not those with fewer than two neighbours that have light. The correction adds their
@@ -165,11 +165,11 @@ def _without_fireflies(color: F32, where: Mask) -> F32:
 def _denoised(color: F32, geometry: Geometry, where: Mask, quality: str, *, is_mirrored: bool) -> F32:
     """Denoise the regions of an image that have light; the guides are an albedo of one, and the normals.
 
-    Where no pixels were sampled, light and guides go on: black, or an edge of the guides, would darken the
-    surfaces there.
+    Where no pixels were sampled, light and guides are continued: a denoiser darkens surfaces beside black
+    pixels, and beside an edge of its guides.
     """
     clean = np.zeros_like(color)
-    for part, own in _regions(np.any(color, axis=2)):
+    for part, own in _regions(where & np.any(color, axis=2)):
         source = _continued(where[part], is_mirrored=is_mirrored)
         light, normal = color[part][source], geometry.normal[part][source]
         denoised = denoise(light, np.ones_like(light), normal, quality=quality)
@@ -178,10 +178,11 @@ def _denoised(color: F32, geometry: Geometry, where: Mask, quality: str, *, is_m
 
 
 def _continued(where: Mask, *, is_mirrored: bool) -> tuple[Any, ...]:
-    """Rows and columns of sampled pixels: of each itself, of others one at the boundary, or mirrored in it.
+    """Rows and columns of the sampled pixels from which all pixels take their values.
 
-    They are jittered by up to the distance to the boundary: copies of single pixels would be streaks, and the
-    noise of a narrow region, mirrored in both of its boundaries, would have a period.
+    Sampled pixels are their own source. That of others is at the boundary, or as far beyond it if mirrored,
+    with a jitter of up to that distance: copies of single pixels would be streaks, and the noise of a narrow
+    region, mirrored in both of its boundaries, would have a period.
     """
     source, missing = np.indices(where.shape, np.int32), ~where
     distance, nearest = scipy.ndimage.distance_transform_edt(missing, return_indices=True)

@@ -12,6 +12,7 @@ import scipy.ndimage
 
 from enfilade.arrays import Array3f, Array3f16, Float, image, lanes
 from enfilade.methods.decoupled.denoising import denoise_light
+from enfilade.methods.decoupled.edges import dilated
 from enfilade.methods.decoupled.records import SpecularAov
 from enfilade.methods.decoupled.surface_image import UploadedImage, upload_layers
 from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
@@ -52,7 +53,14 @@ def filter_spatially(
         replace(g, depth=np.where(g.shape_index < IN_VIRTUAL_IMAGE, g.depth, np.float32(0))) for g in virtual
     ]
     if is_denoised:
-        return [_denoised(g, aov, where, unit) for g, aov in zip(surfaces, aovs, strict=True)]
+        # Pixels beside specular surfaces are sampled, too, and so are those beside panes, which alone have
+        # the second AOV: the denoiser would see dark lines.
+        is_specular = virtual[0].is_specular
+        shown = (is_specular | ~dilated(is_specular), virtual[-1].shape_index >= IN_VIRTUAL_IMAGE)
+        return [
+            _denoised(g, aov, where & is_shown, unit)
+            for g, aov, is_shown in zip(surfaces, aovs, shown[: len(aovs)], strict=True)
+        ]
     height, width = where.shape
     # Find fireflies in the sum: where few rays sample an AOV, each of its samples would be one.
     total = sum((lanes(aov.color) for aov in aovs), Array3f(0))
@@ -95,18 +103,19 @@ def upload_aovs(geometry: Geometry, aovs: Sequence[SpecularAov], count: int, whe
     return upload_layers(geometry, lanes(where), [*layers, *[black] * (count - len(layers))])
 
 
-def _denoised(geometry: Geometry, aov: Shading, where: Mask, unit: float) -> SpecularAov:
-    """Denoise an AOV, guided by the surfaces that are seen in it."""
-    # Beside specular surfaces are others that were sampled, too, and found to have none of it.
-    is_shown = where & (geometry.is_specular | aov.color.any(axis=2))
+def _denoised(geometry: Geometry, aov: Shading, is_shown: Mask, unit: float) -> SpecularAov:
+    """Denoise an AOV, guided by the surfaces that are seen in it; other pixels keep their samples."""
     color = denoise_light(geometry, aov, is_shown, quality=DENOISER, outlier=OUTLIER, is_mirrored=False)
-    # Average the deviation over the sampled pixels.
+    # Average the deviation over the denoised pixels.
+    sampled = np.sqrt(aov.variance)
     deviation, share = (
         scipy.ndimage.uniform_filter(of, DENOISED_SUPPORT)
-        for of in (np.sqrt(aov.variance), where.astype(np.float32))
+        for of in (sampled * is_shown, is_shown.astype(np.float32))
     )
     deviation *= DENOISED_SHARE / np.maximum(share, 1.0 / DENOISED_SUPPORT**2)
-    return SpecularAov.of(color, deviation, unit)
+    return SpecularAov.of(
+        np.where(is_shown[..., None], color, aov.color), np.where(is_shown, deviation, sampled), unit
+    )
 
 
 def _filtered(geometry: Geometry, aov: Shading, where: Mask, weights: Any, unit: float) -> SpecularAov:
