@@ -7,6 +7,7 @@ from PIL import Image
 
 from enfilade.device import active
 from enfilade.scene.mitsuba.load import load_scene
+from support.mitsuba_scene import opened
 
 PLASTIC = '<bsdf type="roughplastic"/>'
 
@@ -36,3 +37,18 @@ def test_flat_parts_are_those_of_the_bsdf_below(tmp_path, axis, angle):
     expected = reflected(tmp_path, PLASTIC, turned)
     assert expected.min() > 0.1
     np.testing.assert_allclose(found, expected, rtol=0.01)
+
+
+@pytest.mark.parametrize(("angle", "is_told"), [(90, True), (270, True), (0, False), (45, False)])
+def test_rectangles_that_lose_light_are_told(tmp_path, angle, is_told):
+    Image.new("L", (4, 4), 128).save(tmp_path / "flat.png")
+    flat = (
+        '<texture type="bitmap"><string name="filename" value="flat.png"/><boolean name="raw" value="true"/>'
+    )
+    bumpy = f'<bsdf type="bumpmap">{flat}</texture>{PLASTIC}</bsdf>'
+    wall = f'<transform name="to_world"><rotate y="1" angle="{angle}"/></transform>'
+    shape = f'<shape type="rectangle" id="wall">{wall}{bumpy}</shape>'
+    file = tmp_path / "scene.xml"
+    file.write_text(f'<scene version="3.0.0"><emitter type="constant"/>{shape}</scene>')
+    notes = opened(file).describe().notes
+    assert any("the rectangle wall loses light" in note for note in notes) == is_told

@@ -136,8 +136,16 @@ def _shear_bump_maps(scene: Any) -> None:
         if not isinstance(mesh, mi.Mesh) or "BumpMap" not in classes(mesh.bsdf()):
             continue
         parameters = mi.traverse(mesh)
-        if "vertex_texcoords" in parameters:  # not of a rectangle
+        if "vertex_texcoords" in parameters:
             uv = np.array(parameters["vertex_texcoords"]).reshape(-1, 2)
             uv[:, 1] += SHEAR * uv[:, 0]
             parameters["vertex_texcoords"] = lanes(uv.ravel())
             parameters.update()
+        elif "to_world" in parameters:  # of a rectangle
+            x, y, z = np.abs(np.array(parameters["to_world"].matrix, np.float32).reshape(4, 4)[:3, 0])
+            if max(x, y) < SHEAR * z:
+                untyped: Any = mi  # its stubs lack the logger
+                untyped.Log(
+                    mi.LogLevel.Warn,
+                    f"the rectangle {mesh.id()} loses light where its bump map is flat: write it as a mesh",
+                )
