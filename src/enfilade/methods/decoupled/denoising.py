@@ -149,7 +149,7 @@ def denoise_light(
     bounded: F32 = np.maximum(corrected, -most * below)
     if is_excess_kept:
         excess = (light.color - limited).sum(axis=(0, 1), dtype=np.float64, where=where[..., None])
-        total = np.maximum(bounded.sum(axis=(0, 1), dtype=np.float64, where=where[..., None]), 1e-20)
+        total = np.maximum(bounded.sum(axis=(0, 1), dtype=np.float64), 1e-20)
         bounded *= np.maximum(1.0 + excess / total, 0.0).astype(np.float32)
     return bounded
 

@@ -56,10 +56,11 @@ def filter_spatially(
         # Pixels beside specular surfaces are sampled, too, and so are those beside panes, which alone have
         # the second AOV: the denoiser would see dark lines.
         is_specular = virtual[0].is_specular
-        shown = (is_specular | ~dilated(is_specular), virtual[-1].shape_index >= IN_VIRTUAL_IMAGE)
+        in_panes = [g.shape_index >= IN_VIRTUAL_IMAGE for g in virtual[1:]]
+        shown = [is_specular | ~dilated(is_specular), *in_panes]
         return [
             _denoised(g, aov, where & is_shown, unit)
-            for g, aov, is_shown in zip(surfaces, aovs, shown[: len(aovs)], strict=True)
+            for g, aov, is_shown in zip(surfaces, aovs, shown, strict=True)
         ]
     height, width = where.shape
     # Find fireflies in the sum: where few rays sample an AOV, each of its samples would be one.
