@@ -143,6 +143,18 @@ def test_the_light_of_outliers_is_kept_without_a_blob():
     assert blocks[0].std() < 0.5 * blocks[1].std()
 
 
+def test_rare_light_of_a_dark_surface_is_not_given_to_a_bright_one():
+    """As in a dark room beside a bright one, where two paths a pixel mostly find nothing."""
+    light = noisy(2)
+    is_dark = np.arange(WHERE.shape[1]) >= 80
+    hits = np.random.default_rng(5).random(WHERE.shape) < 0.01
+    light.color[:] = np.where(is_dark[:, None], 0.05 + 20.0 * hits[..., None], 10.0 * light.color)
+    light.variance[:] = 0.0
+    found = denoised(light, outlier=16.0, is_excess_kept=True)
+    for side in (np.s_[:, :70], np.s_[:, 90:]):
+        assert found[side].mean() == pytest.approx(light.color[side].mean(), rel=0.05)
+
+
 def test_a_highlight_does_not_brighten_the_dark_surface_around_it():
     light = noisy(2)
     share = np.full(WHERE.shape, 0.01, np.float32)

@@ -15,6 +15,7 @@ from enfilade.methods.decoupled.temporal import (
     redisplayed,
     upload_aov,
     upload_displayed,
+    without_negative,
 )
 from support.analytic_truth import geometry_of
 from support.example_scenes import wall
@@ -132,3 +133,20 @@ def test_the_light_of_uncertain_edges_of_a_lamp_is_kept():
     found = made[0] + changed(made)
     assert found[WHERE].std() < 0.9 * made[0][WHERE].std()
     assert found[WHERE].mean() == pytest.approx(1.05, abs=0.01)
+
+
+def test_light_below_zero_leaves_no_black_dots():
+    color = np.random.default_rng(3).uniform(0.1, 0.2, (HEIGHT, WIDTH, 3)).astype(np.float32)
+    expected = color.copy()
+    color[10, 20] = -0.3  # a lobe that is a difference, by chance
+    color[0, 0] = color[0, 1] = -0.1  # of the four pixels in the corner, two are known
+    color[30, 40, 2] = -0.05  # the colour of a saturated surface, whose luminance is known
+    found = without_negative(color)
+    around = np.ones((3, 3), bool)
+    around[1, 1] = False
+    expected[10, 20] = expected[9:12, 19:22][around].mean(axis=0)
+    expected[0, 0] = expected[1, :2].mean(axis=0)
+    expected[0, 1] = np.mean([*expected[1, :3], expected[0, 2]], axis=0)
+    expected[30, 40, 2] = 0.0
+    np.testing.assert_allclose(found, expected, rtol=1e-5)
+    assert not without_negative(np.full((4, 4, 3), -1.0, np.float32)).any()

@@ -10,9 +10,9 @@ import numpy.typing as npt
 import scipy.ndimage
 
 from enfilade.arrays import Array3f, Array4f, image, lanes
-from enfilade.kernels.tone import REC709_LUMINANCE
+from enfilade.kernels.tone import REC709_LUMINANCE, luminance
 from enfilade.methods.decoupled.records import IrradianceImage
-from enfilade.methods.decoupled.wavelet import firefly_weights, guide_of, smooth
+from enfilade.methods.decoupled.wavelet import Guide, firefly_weights, guide_of, smooth
 from enfilade.methods.denoise import denoise
 from enfilade.records import F32, Geometry, Mask, Shading
 
@@ -102,7 +102,8 @@ def denoise_light(
     outlier
         Limit of the input of the correction, in units of the denoised value.
     is_excess_kept
-        Whether light beyond that limit is distributed over the whole image, in proportion to the light there.
+        Whether light beyond that limit is distributed: along surfaces as far as many outliers tell how much
+        of it each surface has, and over the whole image, in proportion to the light there.
     is_mirrored
         Whether the light is that at pixels' centres: where no pixels were sampled, the denoiser sees it
         mirrored. Averages over pixels, which have less light at a boundary, are copied.
@@ -131,9 +132,9 @@ def denoise_light(
     limited = np.clip(light.color, -most * (above + below), most * above)
     guide = guide_of(geometry, where)
     weights = Array3f(*REC709_LUMINANCE)
-    luminance = dr.dot(lanes(above + below), weights)
+    own = lanes(luminance(above + below))
     smoothed, variance = smooth(
-        Array4f(*lanes(limited - clean), luminance),
+        Array4f(*lanes(limited - clean), own),
         lanes(light.variance),
         guide,
         levels=LEVELS,
@@ -143,15 +144,54 @@ def denoise_light(
     # Add it as far as it is significant, in proportion to the luminance.
     difference = smoothed.xyz
     squared = dr.square(dr.dot(difference, weights))
-    share = luminance / dr.maximum(smoothed.w, 1e-20)
+    share = own / dr.maximum(smoothed.w, 1e-20)
     correction = difference * share * squared / dr.maximum(squared + variance, 1e-20)
     corrected = np.where(where[..., None], clean + image(correction, *where.shape), np.float32(0))
     bounded: F32 = np.maximum(corrected, -most * below)
     if is_excess_kept:
-        excess = (light.color - limited).sum(axis=(0, 1), dtype=np.float64, where=where[..., None])
-        total = np.maximum(bounded.sum(axis=(0, 1), dtype=np.float64), 1e-20)
-        bounded *= np.maximum(1.0 + excess / total, 0.0).astype(np.float32)
+        excess = np.where(where[..., None], light.color - limited, np.float32(0))
+        bounded = _with_excess(bounded, excess, guide)
     return bounded
+
+
+def _with_excess(color: F32, excess: F32, guide: Guide) -> F32:
+    """An image with the light of its outliers, of which each surface has as much as is certain.
+
+    The whole image is brightened in proportion to its light. The difference of what surfaces have found is
+    smoothed along them, and counts by the part of its square that exceeds its variance: many outliers tell
+    that a surface has more light or less, a single one does not. The variance of a sum of outliers is the sum
+    of their squares; that of all is added to it, since a surface may have none of them by chance.
+
+    Parameters
+    ----------
+    color : (H, W, 3) float32
+        Without the outliers' light.
+    excess : (H, W, 3) float32
+        Light of outliers, in their pixels.
+    guide
+        Of the wavelet filter.
+
+    Returns
+    -------
+    (H, W, 3) float32
+        With the total of both.
+    """
+
+    def total(of: F32) -> Any:
+        return of.sum(axis=(0, 1), dtype=np.float64)
+
+    even = (total(excess) / np.maximum(total(color), 1e-20)).astype(np.float32) * color
+    own, squared = luminance(color), np.square(luminance(excess))
+    squared += np.square(own) * np.float32(squared.sum() / max(np.square(own).sum(), 1e-20))
+    smoothed, variance = smooth(
+        Array4f(*lanes(excess - even), lanes(own)), lanes(squared), guide, levels=LEVELS, deviations=None
+    )
+    difference = dr.square(dr.dot(smoothed.xyz, Array3f(*REC709_LUMINANCE)))
+    known = dr.maximum(1.0 - variance / dr.maximum(difference, 1e-20), 0.0)
+    uneven = smoothed.xyz * known * (lanes(own) / dr.maximum(smoothed.w, 1e-20))
+    found: F32 = np.maximum(color + even + image(uneven, *own.shape), np.float32(0))
+    found *= np.maximum(total(color + excess) / np.maximum(total(found), 1e-20), 0.0).astype(np.float32)
+    return found
 
 
 def _without_fireflies(color: F32, where: Mask) -> F32:

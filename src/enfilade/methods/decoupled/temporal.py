@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import drjit as dr
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from enfilade.arrays import Array3f, Float, image, lanes, opaque, to_float, to_half, vector3
 from enfilade.cache import LruCache
@@ -83,8 +84,7 @@ class TemporalAccumulation:
             neighbours = [(other, weights[f]) for f, other in displayed.items()]
             color = accumulate_refined(geometry, color, here, neighbours, white=white, unit=unit / white)
 
-        # Specular lobes that are a difference have negative samples: clip the sum.
-        return Frame(np.float32(shot.stored_unit) * np.maximum(color, 0.0), shaded.provenance)
+        return Frame(np.float32(shot.stored_unit) * without_negative(color), shaded.provenance)
 
     def _displayed_image(self, shot: ShotContext, frame: int) -> UploadedImage:
         """A shaded frame as it is displayed, on the device."""
@@ -115,6 +115,20 @@ class TemporalAccumulation:
     def _virtual_geometry(self, shot: ShotContext, frame: int) -> list[Geometry]:
         """G-buffers of a frame with the virtual images of its AOVs."""
         return self._virtual.get(frame, lambda: shot.virtual_images.find(shot.walk.view(frame).geometry))
+
+
+def without_negative(color: F32) -> F32:
+    """An image without light below zero, which is noise of specular lobes that are a difference.
+
+    Pixels whose luminance is below zero would be black dots: they take the mean of those of the eight around
+    whose luminance is not.
+    """
+    is_below = luminance(color) < 0.0
+    light: F32 = np.where(is_below[..., None], np.float32(0), np.maximum(color, np.float32(0)))
+    around = sliding_window_view(np.pad(light, ((1, 1), (1, 1), (0, 0))), (3, 3), axis=(0, 1))[is_below]
+    count = sliding_window_view(np.pad(~is_below, 1), (3, 3))[is_below].sum(axis=(1, 2))
+    light[is_below] = around.sum(axis=(2, 3)) / np.maximum(count, 1)[:, None]
+    return light
 
 
 def window(path: CameraPath, shot: range, frame: int) -> list[int]:
