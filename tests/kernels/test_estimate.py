@@ -12,6 +12,7 @@ from enfilade.arrays import Array3f
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry
 from enfilade.kernels.estimate import Estimate, Samples
+from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.kernels.tone import luminance
 from enfilade.methods.decoupled.reconstruction import ReconstructedEstimate
 from enfilade.records import SurfaceClass
@@ -111,12 +112,19 @@ def test_nan_samples_are_dropped_and_counted():
     assert not lost.variance.any()
 
 
-def test_rays_of_centred_pixels_pass_through_their_centre():
+def test_rays_of_confined_pixels_meet_the_surface_at_their_centre():
     camera = slide(1, size=(16, 12)).cameras[0]
     pixels = np.arange(0, 192, 2, dtype=np.uint32)
-    centred, chosen = pixels % 3 == 0, pixels % 5 != 0
+    confined, chosen = pixels % 3 == 0, pixels % 5 != 0
+    asked = []
 
-    def directions(pixel_filter, centred):
+    def meets_own(pixel, rays):
+        """As if another surface began at the centres."""
+        asked.append(np.array(pixel))
+        centres = camera_rays(camera, pixel_centres(camera, pixel))
+        return rays.direction.x > centres.direction.x
+
+    def directions(pixel_filter, confined):
         found = []
 
         def radiance(rays, _):
@@ -130,18 +138,57 @@ def test_rays_of_centred_pixels_pass_through_their_centre():
             paths_in_flight=64,  # of several in each call
             pixel_filter=pixel_filter,
             random=RandomKey(7, 3, Purpose.FILL),
-            centred=centred,
+            confined=confined,
+            meets_own=meets_own,
         )
         whole.add(2)
         whole.add(3, chosen)
         return np.concatenate(found)
 
-    some, none = (directions(PixelFilter.GAUSSIAN, of) for of in (centred, np.zeros_like(centred)))
-    through_centres = directions(PixelFilter.CENTRE, None)
-    is_centred = np.concatenate([centred.repeat(2), centred[chosen].repeat(3)])
-    np.testing.assert_allclose(some[is_centred], through_centres[is_centred], atol=1e-6)
-    np.testing.assert_array_equal(some[~is_centred], none[~is_centred])
-    assert abs(none - through_centres).max(axis=1).min() > 1e-5
+    some, none = (directions(PixelFilter.GAUSSIAN, of) for of in (confined, np.zeros_like(confined)))
+    centres = directions(PixelFilter.CENTRE, None)
+    is_confined = np.concatenate([confined.repeat(2), confined[chosen].repeat(3)])
+    np.testing.assert_array_equal(some[~is_confined], none[~is_confined])
+    assert set(np.concatenate(asked)) == set(pixels[confined])
+
+    # Half as far, or through the centre.
+    offset = (none - centres)[is_confined]
+    is_beyond = offset[:, :1] <= 0.0
+    expected = np.where(is_beyond, 0.0, 0.5 * offset)
+    np.testing.assert_allclose((some - centres)[is_confined], expected, atol=1e-6)
+    assert 0.3 < is_beyond.mean() < 0.7
+    assert abs(offset).max(axis=1).min() > 1e-5
+
+
+def test_an_empty_list_of_pixels_is_traced():
+    shading = traced(wall(), slide(1).cameras[0], np.array([], np.uint32))
+    assert shading.color.shape == (0, 3)
+
+
+def test_no_kernel_is_compiled_after_the_first_frame():
+    renderer, path = AnalyticRenderer(room(specular=True, noise=0.3)), room_walk(4, size=(48, 36))
+    pixels = np.arange(48 * 36, dtype=np.uint32)
+
+    def render(index):
+        camera = path.cameras[index]
+        find_geometry(renderer, camera)
+        renderer.trace(
+            camera,
+            pixels[index:],
+            RandomKey(index, index, Purpose.FILL),
+            spp=4,
+            pixel_filter=PixelFilter.GAUSSIAN,
+        )
+
+    render(0)
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        for index in range(1, 4):
+            render(index)
+        history = dr.kernel_history([dr.KernelType.JIT])
+    assert len(history) >= 6
+    # from memory, not from disk, where another run may have left every variant of a literal
+    assert all(kernel["cache_hit"] and not kernel["cache_disk"] for kernel in history)
 
 
 @pytest.mark.parametrize("layers", [1, 2])

@@ -14,12 +14,15 @@ from enfilade.arrays import Array2f, Array3f, Bool, Float, Float64, UInt, lanes,
 from enfilade.camera.pinhole import Camera
 from enfilade.kernels.random import PaddedSobolSampler, samplers
 from enfilade.kernels.rays import box_offsets, camera_rays, gaussian_offsets, pixel_centres
+from enfilade.kernels.replay import padded
 from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.records import Shading
-from enfilade.renderer import PixelFilter, RandomKey
+from enfilade.renderer import PixelFilter, RandomKey, Rays
 
 SPP_PER_SUM = 64  # paths of a pixel summed in float32; fixed, so that no size of a batch changes a rounding
 GAUSSIAN_SIGMA_PX, GAUSSIAN_RADIUS_PX = 0.5, 1.5  # PixelFilter.GAUSSIAN
+# Width of the filter of confined pixels, whose values are averaged over pixels again (KITCHEN, `bathroom`).
+CONFINED_FILTER = 0.5
 
 Radiance = Callable[..., Any]
 
@@ -71,8 +74,13 @@ class Estimate:
         Key of the random numbers.
     layers
         Number of layers of the samples.
-    centred : (N,) bool
-        Pixels of the list whose rays all pass through their centre. None: no such pixels.
+    confined : (N,) bool
+        Pixels of the list whose rays all meet the surface at their centre: the filter has
+        :data:`CONFINED_FILTER` of its width, and rays that meet another surface pass through the centre.
+        None: no such pixels.
+    meets_own
+        Maps pixels (UInt, flat indices) and camera rays to whether they meet the surface at the pixel's
+        centre (Bool). Needed where pixels are confined.
     """
 
     def __init__(
@@ -85,14 +93,16 @@ class Estimate:
         pixel_filter: PixelFilter,
         random: RandomKey,
         layers: int = 1,
-        centred: npt.NDArray[np.bool_] | None = None,
+        confined: npt.NDArray[np.bool_] | None = None,
+        meets_own: Callable[[Any, Rays], Any] | None = None,
     ) -> None:
         self._camera = camera
         self._pixels = pixels
         self._radiance = radiance
         self._paths_in_flight = paths_in_flight
         self._filter = pixel_filter
-        self._centred = centred
+        self._confined = confined
+        self._meets_own = meets_own
         self._random = random
         self._next = 0  # index of the next path of each pixel
         self._traced = 0  # paths of all pixels together
@@ -120,8 +130,9 @@ class Estimate:
                 slot, pixel, path = _numbered(self._pixels[part], first, count)
                 sampler = samplers(pixel, path, self._random)
                 offset = self._offset(sampler)
-                if self._centred is not None:
-                    offset = dr.select(dr.gather(Bool, lanes(self._centred[part]), slot), 0.0, offset)
+                if self._confined is not None:
+                    is_confined = dr.gather(Bool, lanes(self._confined[part]), slot)
+                    offset = self._confined_offset(offset, pixel, dr.compress(is_confined))
                 rays = camera_rays(self._camera, pixel_centres(self._camera, pixel) + offset)
 
                 # Trace them, and add the sums over each pixel's lanes to the totals.
@@ -179,6 +190,18 @@ class Estimate:
             case PixelFilter.GAUSSIAN:
                 return gaussian_offsets(sampler.next_2d(), sigma=GAUSSIAN_SIGMA_PX, radius=GAUSSIAN_RADIUS_PX)
         return Array2f(0.0)
+
+    def _confined_offset(self, offset: Any, pixel: Any, chosen: Any) -> Any:
+        """Offsets of camera rays (Array2f), of which those of some lanes (UInt) are confined."""
+        if not dr.width(chosen):
+            return offset
+        assert self._meets_own is not None  # noqa: S101  (pixels are confined)
+        lane, is_real = padded(chosen)
+        nearer, at = CONFINED_FILTER * dr.gather(Array2f, offset, lane), dr.gather(UInt, pixel, lane)
+        rays = camera_rays(self._camera, pixel_centres(self._camera, at) + nearer)
+        confined = Array2f(offset)
+        dr.scatter(confined, dr.select(self._meets_own(at, rays), nearer, 0.0), lane, is_real)
+        return confined
 
     def _accumulate(
         self,

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from enfilade.arrays import lanes
 from enfilade.gbuffer import find_geometry
+from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.methods.decoupled import surface_edges as kernel
 from enfilade.methods.decoupled.surface_image import PLANE_TOLERANCE
 from support.material_scene import MATERIALS, front_camera, opened_scene
@@ -34,6 +36,33 @@ def test_the_kernel_finds_the_edges_of_the_loops(tmp_path):
         assert 0.02 < theirs.mean() < 0.9
         # Single precision decides otherwise where a distance is just at the tolerance.
         assert (ours != theirs).mean() < 2e-3
+
+
+def test_rays_through_the_pixels_beside_an_edge_meet_other_surfaces(tmp_path):
+    renderer, camera = (
+        opened_scene(tmp_path, dict.fromkeys("abcdefghijklm", MATERIALS["diffuse"])),
+        front_camera(64, 48),
+    )
+    geometry = find_geometry(renderer, camera)
+    is_edge, _ = kernel.surface_edges(geometry)
+    own = kernel.OwnSurfaces(renderer, geometry, np.ones((48, 64), bool))
+    pixel = np.arange(64 * 48, dtype=np.uint32).reshape(48, 64)
+
+    def are_met(down, across):
+        """Whether rays through the centre of a neighbour meet a pixel's surface, away from the border."""
+        inside = np.s_[1:-1, 1:-1]
+        there = np.roll(pixel, (-down, -across), (0, 1))[inside].ravel()
+        rays = camera_rays(camera, pixel_centres(camera, lanes(there)))
+        return np.array(own(lanes(pixel[inside].ravel()), rays)).reshape(46, 62)
+
+    is_seen = geometry.shape_index[1:-1, 1:-1] > 0
+    assert are_met(0, 0)[is_seen].all()
+    assert not are_met(0, 0)[~is_seen].any()
+    beside = [are_met(*step) for step in ((0, 1), (0, -1), (1, 0), (-1, 0))]
+    is_beside_other = ~np.all(beside, axis=0)
+    differing = is_beside_other[is_seen] != is_edge[1:-1, 1:-1][is_seen]
+    assert 0.02 < is_edge[1:-1, 1:-1][is_seen].mean() < 0.9
+    assert differing.mean() < 2e-3
 
 
 def test_a_crease_within_a_shape_is_an_edge(tmp_path):

@@ -29,6 +29,7 @@ from enfilade.methods.decoupled.path_depth import KEYFRAMES, DepthWeights
 from enfilade.methods.decoupled.path_kernels import ENTRY_PX
 from enfilade.methods.decoupled.paths import Path, spawn
 from enfilade.methods.decoupled.reconstruction import ReconstructedEstimate
+from enfilade.methods.decoupled.surface_edges import OwnSurfaces
 from enfilade.methods.decoupled.surface_image import UploadedImage, blank_image
 from enfilade.methods.decoupled.virtual_images import VirtualImages
 from enfilade.methods.walkthrough import Walkthrough
@@ -127,15 +128,17 @@ class ShotContext:
         *,
         pixel_filter: PixelFilter = PixelFilter.CENTRE,
         layers: int = 2,
-        centred: Mask | None = None,
+        confined: OwnSurfaces | None = None,
     ) -> Estimate:
         """An estimate of pixels, without paths yet.
 
         Parameters
         ----------
         camera
-        where, centred : (H, W) bool
-            Pixels, and those of them whose rays all pass through their centre. None: no such pixels.
+        where : (H, W) bool
+            Pixels.
+        confined
+            Those of them whose rays all meet the surface at their centre. None: no such pixels.
         radiance, random, pixel_filter, layers
             As of :class:`Estimate`.
         """
@@ -147,7 +150,8 @@ class ShotContext:
             pixel_filter=pixel_filter,
             random=random,
             layers=layers,
-            centred=None if centred is None else centred[where],
+            confined=None if confined is None else confined.where[where],
+            meets_own=confined,
         )
 
     def reconstructed_estimate(

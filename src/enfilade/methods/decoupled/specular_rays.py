@@ -27,7 +27,7 @@ from enfilade.methods.decoupled.sample_counts import specular_spp
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.specular_filter import filter_spatially, upload_aovs, with_edges
 from enfilade.methods.decoupled.specular_tint import find_tint
-from enfilade.methods.decoupled.surface_edges import narrow_surfaces, surface_edges
+from enfilade.methods.decoupled.surface_edges import OwnSurfaces, narrow_surfaces, surface_edges
 from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
 from enfilade.records import F32, Geometry, Mask
 from enfilade.renderer import PixelFilter, Purpose
@@ -68,12 +68,13 @@ def shade_specular(
     is_seen_in = where & np.any([g.shape_index >= IN_VIRTUAL_IMAGE for g in virtual], axis=0)
     in_mirrors = is_seen_in & dilated(np.any([is_outline(g) for g in virtual], axis=0))
 
-    # Trace over the whole pixel; beside another surface through its centre, unless it shows a virtual image.
+    # Trace over the whole pixel; beside another surface where the pixel shows its own, unless it shows a
+    # virtual image.
     is_edge, is_thin = surface_edges(geometry)
     # Narrow surfaces have more rays, but for those whose rays are traced at edges again.
     is_traced_later = in_mirrors | is_thin
     is_narrow = narrow_surfaces(is_edge, where) & ~is_traced_later
-    is_centre = where & (is_edge | is_thin) & ~is_seen_in
+    own = OwnSurfaces(shot.renderer, geometry, where & (is_edge | is_thin) & ~is_seen_in)
     sampling = AdaptiveSampling.of(shot.walk, times=SPECULAR_DEVIATION, beneath=beneath)
     estimate = shot.estimate(
         geometry.camera,
@@ -82,7 +83,7 @@ def shade_specular(
         shot.walk.random(frame, Purpose.SPECULAR),
         pixel_filter=PixelFilter.GAUSSIAN,
         layers=SPECULAR_AOVS,
-        centred=is_centre,
+        confined=own,
     )
     spp = specular_spp(shot.settings, shot.frames)
     estimate.add(spp)
@@ -93,7 +94,7 @@ def shade_specular(
     release_memory()
 
     # Filter the AOVs along the surfaces that are seen in them, without the texture of metal.
-    tint = find_tint(shot, frame, where, is_centre, is_narrow, spp)
+    tint = find_tint(shot, frame, where, own, is_narrow, spp)
     if tint:
         traced[0] = tint.divided(traced[0])
         release_memory()

@@ -16,6 +16,7 @@ from enfilade.kernels.estimate import Samples
 from enfilade.kernels.tone import luminance
 from enfilade.methods.decoupled.records import SpecularAov
 from enfilade.methods.decoupled.shot import ShotContext
+from enfilade.methods.decoupled.surface_edges import OwnSurfaces
 from enfilade.records import F32, Mask, Shading
 from enfilade.renderer import PixelFilter, Purpose, Rays
 
@@ -49,7 +50,7 @@ class Tint:
 
 
 def find_tint(
-    shot: ShotContext, frame: int, where: Mask, centred: Mask, narrow: Mask, spp: int
+    shot: ShotContext, frame: int, where: Mask, own: OwnSurfaces, narrow: Mask, spp: int
 ) -> Tint | None:
     """The tint of the pixels of a frame; None where no metal with a texture is seen.
 
@@ -59,8 +60,8 @@ def find_tint(
     frame
     where : (H, W) bool
         Pixels with specular rays.
-    centred : (H, W) bool
-        Those whose rays all pass through their centre.
+    own
+        Those whose rays all meet the surface at their centre.
     narrow : (H, W) bool
         Those that may have more rays than the first ones.
     spp
@@ -88,13 +89,13 @@ def find_tint(
         radiance,
         shot.walk.random(frame, Purpose.SPECULAR),
         pixel_filter=PixelFilter.GAUSSIAN,
-        centred=centred,
+        confined=own,
     )
     estimate.add(spp)
     is_textured = estimate.is_marked
     if not is_textured.any():
         return None
     sampled = mean()
-    estimate.add(max(TINT_RAYS - spp, 0), is_textured & ~centred[where])
+    estimate.add(max(TINT_RAYS - spp, 0), is_textured)
     whole = mean()
     return Tint(np.where(narrow[..., None], whole, sampled), whole)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import drjit as dr
 import numpy as np
 
@@ -10,6 +12,7 @@ from enfilade.kernels.rays import points_at
 from enfilade.methods.decoupled.edges import beside, dilated
 from enfilade.methods.decoupled.surface_image import PLANE_TOLERANCE
 from enfilade.records import Geometry, Mask
+from enfilade.renderer import Rays, Renderer
 
 CREASE_COSINE = 0.9  # between the normals of two pixels, below which they show different surfaces
 RADIUS_PX = 2
@@ -55,11 +58,9 @@ def surface_edges(geometry: Geometry) -> tuple[Mask, Mask]:
 
             # Compare the surfaces.
             there, bent = dr.gather(Array3f, position, tap) - position, dr.gather(Array3f, normal, tap)
-            tolerance = PLANE_TOLERANCE * dr.minimum(depth, dr.gather(Float, depth, tap))
+            nearer = dr.minimum(depth, dr.gather(Float, depth, tap))
             is_same = dr.gather(UInt, index, tap) == index
-            is_flat = (dr.dot(bent, normal) > CREASE_COSINE) & (dr.abs(dr.dot(there, normal)) <= tolerance)
-            is_flat &= dr.abs(dr.dot(there, bent)) <= tolerance
-            is_same &= is_flat | (index == 0)
+            is_same &= _is_flat(there, normal, bent, nearer) | (index == 0)
 
             # Count.
             support += dr.select(is_same | ~is_inside, 1, 0)
@@ -68,6 +69,63 @@ def surface_edges(geometry: Geometry) -> tuple[Mask, Mask]:
     is_thin = support < MIN_SUPPORT
     dr.eval(is_edge, is_thin)
     return image(is_edge, height, width), image(is_thin, height, width)
+
+
+def _is_flat(between: Any, one: Any, other: Any, depth: Any) -> Any:
+    """Whether two points lie in the tangent planes of each other, and their normals agree; Bool.
+
+    Parameters
+    ----------
+    between : Array3f
+        Vector from one point to the other.
+    one, other : Array3f
+        Normals.
+    depth : Float
+        Of the nearer point.
+    """
+    tolerance = PLANE_TOLERANCE * depth
+    is_within = (dr.abs(dr.dot(between, one)) <= tolerance) & (dr.abs(dr.dot(between, other)) <= tolerance)
+    return is_within & (dr.dot(one, other) > CREASE_COSINE)
+
+
+class OwnSurfaces:
+    """Surfaces at the centres of a G-buffer's pixels; called with camera rays, tells whether they meet them.
+
+    Parameters
+    ----------
+    renderer
+    geometry
+        Of shape (H, W).
+    where : (H, W) bool
+        Pixels whose rays are confined to them.
+    """
+
+    def __init__(self, renderer: Renderer, geometry: Geometry, where: Mask) -> None:
+        self.where = where
+        self._renderer, self._camera = renderer, geometry.camera
+        self._indices, self._depths = lanes(geometry.shape_index), lanes(geometry.depth)
+        self._normals = lanes(geometry.normal)
+
+    def __call__(self, pixel: Any, rays: Rays) -> Any:
+        """Whether camera rays meet the surface at the centre of a pixel.
+
+        Parameters
+        ----------
+        pixel : UInt
+            Flat indices.
+        rays
+            With directions of unit depth.
+
+        Returns
+        -------
+        Bool
+        """
+        seen = self._renderer.surfaces(rays)
+        depth = dr.gather(Float, self._depths, pixel)
+        between = rays.origin + seen.distance * rays.direction - points_at(self._camera, depth, pixel)
+        normal = dr.gather(Array3f, self._normals, pixel)
+        is_same = seen.is_hit & (seen.shape_index == dr.gather(UInt, self._indices, pixel))
+        return Bool(is_same & _is_flat(between, normal, seen.normal, dr.minimum(depth, seen.distance)))
 
 
 def narrow_surfaces(is_edge: Mask, where: Mask) -> Mask:
