@@ -160,37 +160,6 @@ def test_rays_of_confined_pixels_meet_the_surface_at_their_centre():
     assert abs(offset).max(axis=1).min() > 1e-5
 
 
-def test_an_empty_list_of_pixels_is_traced():
-    shading = traced(wall(), slide(1).cameras[0], np.array([], np.uint32))
-    assert shading.color.shape == (0, 3)
-
-
-def test_no_kernel_is_compiled_after_the_first_frame():
-    renderer, path = AnalyticRenderer(room(specular=True, noise=0.3)), room_walk(4, size=(48, 36))
-    pixels = np.arange(48 * 36, dtype=np.uint32)
-
-    def render(index):
-        camera = path.cameras[index]
-        find_geometry(renderer, camera)
-        renderer.trace(
-            camera,
-            pixels[index:],
-            RandomKey(index, index, Purpose.FILL),
-            spp=4,
-            pixel_filter=PixelFilter.GAUSSIAN,
-        )
-
-    render(0)
-    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
-        dr.kernel_history_clear()
-        for index in range(1, 4):
-            render(index)
-        history = dr.kernel_history([dr.KernelType.JIT])
-    assert len(history) >= 6
-    # from memory, not from disk, where another run may have left every variant of a literal
-    assert all(kernel["cache_hit"] and not kernel["cache_disk"] for kernel in history)
-
-
 @pytest.mark.parametrize("layers", [1, 2])
 @pytest.mark.parametrize("kind", [Estimate, ReconstructedEstimate])
 def test_the_luminance_is_that_of_all_layers_together(kind, layers):
