@@ -187,7 +187,7 @@ def _with_excess(color: F32, excess: F32, guide: Guide) -> F32:
         Array4f(*lanes(excess - even), lanes(own)), lanes(squared), guide, levels=LEVELS, deviations=None
     )
     difference = dr.square(dr.dot(smoothed.xyz, Array3f(*REC709_LUMINANCE)))
-    known = dr.maximum(1.0 - variance / dr.maximum(difference, 1e-20), 0.0)
+    known = dr.select(difference > variance, 1.0 - variance / difference, 0.0)
     uneven = smoothed.xyz * known * (lanes(own) / dr.maximum(smoothed.w, 1e-20))
     found: F32 = np.maximum(color + even + image(uneven, *own.shape), np.float32(0))
     found *= np.maximum(total(color + excess) / np.maximum(total(found), 1e-20), 0.0).astype(np.float32)
