@@ -11,8 +11,7 @@ import pytest
 from enfilade.arrays import Array3f
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry
-from enfilade.kernels.estimate import Estimate, Samples
-from enfilade.kernels.rays import camera_rays, pixel_centres
+from enfilade.kernels.estimate import Confined, Estimate, Samples
 from enfilade.kernels.tone import luminance
 from enfilade.methods.decoupled.reconstruction import ReconstructedEstimate
 from enfilade.records import SurfaceClass
@@ -112,19 +111,14 @@ def test_nan_samples_are_dropped_and_counted():
     assert not lost.variance.any()
 
 
-def test_rays_of_confined_pixels_meet_the_surface_at_their_centre():
+def test_rays_of_confined_pixels_keep_their_limits():
     camera = slide(1, size=(16, 12)).cameras[0]
     pixels = np.arange(0, 192, 2, dtype=np.uint32)
-    confined, chosen = pixels % 3 == 0, pixels % 5 != 0
-    asked = []
+    where, chosen = pixels % 3 == 0, pixels % 5 != 0
+    low, high = -np.float32(pixels % 4 > 0), np.float32(pixels % 8 > 2)
+    limits = np.stack([low, 0.1 * low], axis=1), np.stack([high, 0.1 * high], axis=1)
 
-    def meets_own(pixel, rays):
-        """As if another surface began at the centres."""
-        asked.append(np.array(pixel))
-        centres = camera_rays(camera, pixel_centres(camera, pixel))
-        return rays.direction.x > centres.direction.x
-
-    def directions(pixel_filter, confined):
+    def directions(pixel_filter, where):
         found = []
 
         def radiance(rays, _):
@@ -138,26 +132,24 @@ def test_rays_of_confined_pixels_meet_the_surface_at_their_centre():
             paths_in_flight=64,  # of several in each call
             pixel_filter=pixel_filter,
             random=RandomKey(7, 3, Purpose.FILL),
-            confined=confined,
-            meets_own=meets_own,
+            confined=None if where is None else Confined(where, *limits),
         )
         whole.add(2)
         whole.add(3, chosen)
         return np.concatenate(found)
 
-    some, none = (directions(PixelFilter.GAUSSIAN, of) for of in (confined, np.zeros_like(confined)))
+    some, none = (directions(PixelFilter.GAUSSIAN, of) for of in (where, None))
     centres = directions(PixelFilter.CENTRE, None)
-    is_confined = np.concatenate([confined.repeat(2), confined[chosen].repeat(3)])
-    np.testing.assert_array_equal(some[~is_confined], none[~is_confined])
-    assert set(np.concatenate(asked)) == set(pixels[confined])
+    np.testing.assert_allclose(directions(PixelFilter.CENTRE, where), centres, atol=1e-6)
 
-    # Half as far, or through the centre.
-    offset = (none - centres)[is_confined]
-    is_beyond = offset[:, :1] <= 0.0
-    expected = np.where(is_beyond, 0.0, 0.5 * offset)
-    np.testing.assert_allclose((some - centres)[is_confined], expected, atol=1e-6)
-    assert 0.3 < is_beyond.mean() < 0.7
-    assert abs(offset).max(axis=1).min() > 1e-5
+    # Offsets in pixels.
+    per_lane = np.concatenate([np.arange(len(pixels)).repeat(2), np.flatnonzero(chosen).repeat(3)])
+    to_pixels = np.linalg.inv(camera.direction_from_pixel).T
+    some, none = (((of - centres) @ to_pixels)[:, :2] for of in (some, none))
+    is_confined = where[per_lane]
+    expected = np.clip(0.5 * none, limits[0][per_lane], limits[1][per_lane])
+    np.testing.assert_allclose(some, np.where(is_confined[:, None], expected, none), atol=1e-4)
+    assert 0.1 < (np.abs(expected - 0.5 * none) > 1e-3)[is_confined].mean() < 0.9
 
 
 @pytest.mark.parametrize("layers", [1, 2])

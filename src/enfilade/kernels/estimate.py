@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 import numpy as np
@@ -14,10 +14,9 @@ from enfilade.arrays import Array2f, Array3f, Bool, Float, Float64, UInt, lanes,
 from enfilade.camera.pinhole import Camera
 from enfilade.kernels.random import PaddedSobolSampler, samplers
 from enfilade.kernels.rays import box_offsets, camera_rays, gaussian_offsets, pixel_centres
-from enfilade.kernels.replay import padded
 from enfilade.kernels.tone import REC709_LUMINANCE
-from enfilade.records import Shading
-from enfilade.renderer import PixelFilter, RandomKey, Rays
+from enfilade.records import F32, Shading
+from enfilade.renderer import PixelFilter, RandomKey
 
 SPP_PER_SUM = 64  # paths of a pixel summed in float32; fixed, so that no size of a batch changes a rounding
 GAUSSIAN_SIGMA_PX, GAUSSIAN_RADIUS_PX = 0.5, 1.5  # PixelFilter.GAUSSIAN
@@ -55,6 +54,25 @@ class RayCount:
         return RayCount(self.rays + other.rays, self.dropped + other.dropped)
 
 
+class Confined(NamedTuple):
+    """Pixels whose camera rays have :data:`CONFINED_FILTER` of the filter's width, and limits.
+
+    Attributes
+    ----------
+    where : (..., ) bool
+    low, high : (..., 2) float32
+        Limits of the rays' offsets from the centres, in pixels.
+    """
+
+    where: npt.NDArray[np.bool_]
+    low: F32
+    high: F32
+
+    def of(self, pixels: npt.NDArray[Any]) -> Confined:
+        """The same of some pixels, by a mask or their indices."""
+        return Confined(self.where[pixels], self.low[pixels], self.high[pixels])
+
+
 class Estimate:
     """Means over the paths of each pixel of a list, to which paths can be added.
 
@@ -74,13 +92,8 @@ class Estimate:
         Key of the random numbers.
     layers
         Number of layers of the samples.
-    confined : (N,) bool
-        Pixels of the list whose rays all meet the surface at their centre: the filter has
-        :data:`CONFINED_FILTER` of its width, and rays that meet another surface pass through the centre.
-        None: no such pixels.
-    meets_own
-        Maps pixels (UInt, flat indices) and camera rays to whether they meet the surface at the pixel's
-        centre (Bool). Needed where pixels are confined.
+    confined
+        Pixels of the list whose rays meet a part of the surfaces that they show. None: no such pixels.
     """
 
     def __init__(
@@ -93,8 +106,7 @@ class Estimate:
         pixel_filter: PixelFilter,
         random: RandomKey,
         layers: int = 1,
-        confined: npt.NDArray[np.bool_] | None = None,
-        meets_own: Callable[[Any, Rays], Any] | None = None,
+        confined: Confined | None = None,
     ) -> None:
         self._camera = camera
         self._pixels = pixels
@@ -102,7 +114,6 @@ class Estimate:
         self._paths_in_flight = paths_in_flight
         self._filter = pixel_filter
         self._confined = confined
-        self._meets_own = meets_own
         self._random = random
         self._next = 0  # index of the next path of each pixel
         self._traced = 0  # paths of all pixels together
@@ -131,8 +142,13 @@ class Estimate:
                 sampler = samplers(pixel, path, self._random)
                 offset = self._offset(sampler)
                 if self._confined is not None:
-                    is_confined = dr.gather(Bool, lanes(self._confined[part]), slot)
-                    offset = self._confined_offset(offset, pixel, dr.compress(is_confined))
+                    where, low, high = map(lanes, self._confined.of(part))
+                    nearer = dr.clip(
+                        CONFINED_FILTER * offset,
+                        dr.gather(Array2f, low, slot),
+                        dr.gather(Array2f, high, slot),
+                    )
+                    offset = dr.select(dr.gather(Bool, where, slot), nearer, offset)
                 rays = camera_rays(self._camera, pixel_centres(self._camera, pixel) + offset)
 
                 # Trace them, and add the sums over each pixel's lanes to the totals.
@@ -190,18 +206,6 @@ class Estimate:
             case PixelFilter.GAUSSIAN:
                 return gaussian_offsets(sampler.next_2d(), sigma=GAUSSIAN_SIGMA_PX, radius=GAUSSIAN_RADIUS_PX)
         return Array2f(0.0)
-
-    def _confined_offset(self, offset: Any, pixel: Any, chosen: Any) -> Any:
-        """Offsets of camera rays (Array2f), of which those of some lanes (UInt) are confined."""
-        if not dr.width(chosen):
-            return offset
-        assert self._meets_own is not None  # noqa: S101  (pixels are confined)
-        lane, is_real = padded(chosen)
-        nearer, at = CONFINED_FILTER * dr.gather(Array2f, offset, lane), dr.gather(UInt, pixel, lane)
-        rays = camera_rays(self._camera, pixel_centres(self._camera, at) + nearer)
-        confined = Array2f(offset)
-        dr.scatter(confined, dr.select(self._meets_own(at, rays), nearer, 0.0), lane, is_real)
-        return confined
 
     def _accumulate(
         self,

@@ -1,5 +1,6 @@
 """Denoised irradiance: less noise, the same mean, and no surface tinted by one path."""
 
+from dataclasses import replace
 from unittest.mock import Mock
 
 import numpy as np
@@ -143,16 +144,34 @@ def test_the_light_of_outliers_is_kept_without_a_blob():
     assert blocks[0].std() < 0.5 * blocks[1].std()
 
 
-def test_rare_light_of_a_dark_surface_is_not_given_to_a_bright_one():
+@pytest.mark.parametrize(("rare", "tolerance"), [(0.2, 0.03), (5.0, 0.06)])
+def test_rare_light_of_a_dark_surface_stays_there(rare, tolerance):
     """As in a dark room beside a bright one, where two paths a pixel mostly find nothing."""
     light = noisy(2)
     is_dark = np.arange(WHERE.shape[1]) >= 80
+    shape_index = np.where(is_dark, GEOMETRY.shape_index + 1, GEOMETRY.shape_index).astype(np.uint32)
     hits = np.random.default_rng(5).random(WHERE.shape) < 0.01
-    light.color[:] = np.where(is_dark[:, None], 0.05 + 20.0 * hits[..., None], 10.0 * light.color)
+    light.color[:] = np.where(is_dark[:, None], 0.05 + 100.0 * rare * hits[..., None], 10.0 * light.color)
     light.variance[:] = 0.0
+    geometry = replace(GEOMETRY, shape_index=shape_index)
+    found = denoise_light(geometry, light, WHERE, quality="balanced", outlier=16.0, is_excess_kept=True)
+    for side in (is_dark, ~is_dark):
+        assert found[:, side].mean() == pytest.approx(light.color[:, side].mean(), rel=tolerance)
+
+
+def test_light_below_zero_stays_where_the_light_of_outliers_is_distributed():
+    """As of paths behind cut-outs, from whose light an expectation is subtracted."""
+    light = noisy(2)
+    light.variance[:] = 0.0
+    is_below = np.arange(WHERE.shape[1]) >= 80
+    light.color[:] *= np.where(is_below, -0.5, 1.0).astype(np.float32)[:, None]
+    limited, kept = (denoised(light, outlier=16.0, is_excess_kept=of) for of in (False, True))
+    np.testing.assert_allclose(kept, limited, atol=2e-3)
+    light.color[30, 20] = light.color[90, 60] = 300.0
     found = denoised(light, outlier=16.0, is_excess_kept=True)
-    for side in (np.s_[:, :70], np.s_[:, 90:]):
-        assert found[side].mean() == pytest.approx(light.color[side].mean(), rel=0.05)
+    assert np.isfinite(found).all()
+    assert found[:, 90:].mean() == pytest.approx(-0.5, rel=0.06)
+    assert found[:, :70].mean() == pytest.approx(1.0, rel=0.06)
 
 
 def test_a_highlight_does_not_brighten_the_dark_surface_around_it():

@@ -32,6 +32,14 @@ PLASTIC = (
 )
 
 
+FINE_TEXTURE = (
+    '<bsdf type="roughplastic"><float name="alpha" value="0.2"/><rgb name="diffuse_reflectance" value="0"/>'
+    '<texture name="specular_reflectance" type="checkerboard"><rgb name="color0" value="0"/>'
+    '<rgb name="color1" value="1"/><transform name="to_uv"><scale x="60" y="60"/></transform></texture>'
+    "</bsdf>"
+)
+
+
 def blocks(folder: Path, bsdf: str, *, wall: float, sky: float) -> MitsubaRenderer:
     """Three blocks, one of them thin, before a diffuse wall."""
     shapes = "".join(
@@ -86,6 +94,16 @@ def test_faint_edges_of_glossy_surfaces_are_antialiased(tmp_path, monkeypatch):
     # A threshold of twice the tolerance, that is contrasts of four times it, leaves them aliased.
     monkeypatch.setattr(specular_rays, "SPECULAR_CONTRAST", 2.0)
     assert error < 0.7 * edge_error(renderer)
+
+
+def test_specular_rays_at_edges_cover_what_the_pixel_shows_of_its_surface(tmp_path, monkeypatch):
+    # A texture finer than pixels: what a centre shows is not what its pixel shows.
+    renderer = blocks(tmp_path, FINE_TEXTURE, wall=0.01, sky=20.0)
+    error = edge_error(renderer)
+    centre = np.zeros((*SIZE[::-1], 2), np.float32)
+    monkeypatch.setattr(specular_rays, "own_sides", lambda _: (centre, centre))
+    through_centres = edge_error(renderer)
+    assert error < 0.5 * through_centres
 
 
 def test_narrow_surfaces_may_have_more_rays(tmp_path, monkeypatch):

@@ -137,16 +137,23 @@ def test_the_light_of_uncertain_edges_of_a_lamp_is_kept():
 
 def test_light_below_zero_leaves_no_black_dots():
     color = np.random.default_rng(3).uniform(0.1, 0.2, (HEIGHT, WIDTH, 3)).astype(np.float32)
+    shapes = np.ones((HEIGHT, WIDTH), np.uint32)
+    shapes[9:12, 21] = 2
+    color[9:12, 21] = 50.0  # a lamp beside the dot
     expected = color.copy()
     color[10, 20] = -0.3  # a lobe that is a difference, by chance
-    color[0, 0] = color[0, 1] = -0.1  # of the four pixels in the corner, two are known
-    color[30, 40, 2] = -0.05  # the colour of a saturated surface, whose luminance is known
-    found = without_negative(color)
-    around = np.ones((3, 3), bool)
-    around[1, 1] = False
-    expected[10, 20] = expected[9:12, 19:22][around].mean(axis=0)
-    expected[0, 0] = expected[1, :2].mean(axis=0)
-    expected[0, 1] = np.mean([*expected[1, :3], expected[0, 2]], axis=0)
+    color[0, 0] = -0.1  # in a corner
+    color[30, 40, 2] = -0.05  # one channel of a saturated colour, whose luminance is above zero
+    found = without_negative(color, shapes)
+    expected[10, 20] = np.mean([*color[9:12, 19], color[9, 20], color[11, 20]], axis=0)
+    expected[0, 0] = np.mean([color[0, 1], color[1, 0], color[1, 1]], axis=0)
     expected[30, 40, 2] = 0.0
     np.testing.assert_allclose(found, expected, rtol=1e-5)
-    assert not without_negative(np.full((4, 4, 3), -1.0, np.float32)).any()
+
+
+def test_noise_about_zero_is_not_brightened_by_the_pixels_around():
+    noise = np.random.default_rng(4).normal(0.0, 0.1, (HEIGHT, WIDTH, 3)).mean(axis=2, keepdims=True)
+    color = np.repeat(noise, 3, axis=2).astype(np.float32)
+    found = without_negative(color, np.ones((HEIGHT, WIDTH), np.uint32))
+    assert found.min() >= 0.0
+    assert found.mean() < 1.25 * np.maximum(color, 0.0).mean()

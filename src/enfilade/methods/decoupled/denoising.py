@@ -150,48 +150,60 @@ def denoise_light(
     bounded: F32 = np.maximum(corrected, -most * below)
     if is_excess_kept:
         excess = np.where(where[..., None], light.color - limited, np.float32(0))
-        bounded = _with_excess(bounded, excess, guide)
+        if excess.any():
+            bounded = _with_excess(bounded, excess, above + below, guide)
     return bounded
 
 
-def _with_excess(color: F32, excess: F32, guide: Guide) -> F32:
-    """An image with the light of its outliers, of which each surface has as much as is certain.
+def _with_excess(color: F32, excess: F32, weight: F32, guide: Guide) -> F32:
+    """Light with that of its outliers: on their surfaces where it is certain, else over the whole image.
 
-    The whole image is brightened in proportion to its light. The difference of what surfaces have found is
-    smoothed along them, and counts by the part of its square that exceeds its variance: many outliers tell
-    that a surface has more light or less, a single one does not. The variance of a sum of outliers is the sum
-    of their squares; that of all is added to it, since a surface may have none of them by chance.
+    The null hypothesis is that outliers are distributed in proportion to the light. The difference from it is
+    smoothed along surfaces. By the part of its square that exceeds its variance, as in the positive-part
+    James-Stein estimator, surfaces have what was found on them; the rest is distributed in proportion to the
+    light. The variance of a sum of outliers is the sum of their squares; that of the hypothesis is added,
+    since a surface may have no outliers by chance.
 
     Parameters
     ----------
     color : (H, W, 3) float32
-        Without the outliers' light.
+        Without the outliers' light; what is below zero stays.
     excess : (H, W, 3) float32
         Light of outliers, in their pixels.
+    weight : (H, W, 3) float32
+        Magnitude of the light, 0 or more.
     guide
         Of the wavelet filter.
 
     Returns
     -------
     (H, W, 3) float32
-        With the total of both.
     """
 
     def total(of: F32) -> Any:
         return of.sum(axis=(0, 1), dtype=np.float64)
 
-    even = (total(excess) / np.maximum(total(color), 1e-20)).astype(np.float32) * color
-    own, squared = luminance(color), np.square(luminance(excess))
+    def proportional(amount: Any, weight: F32) -> F32:
+        """An amount of light (3,), distributed in proportion to the weights."""
+        scale = np.where(total(weight) > 0.0, amount / np.maximum(total(weight), 1e-20), 0.0)
+        return weight * scale.astype(np.float32)
+
+    # Smooth the difference from the hypothesis along surfaces.
+    even, own, squared = proportional(total(excess), weight), luminance(weight), np.square(luminance(excess))
     squared += np.square(own) * np.float32(squared.sum() / max(np.square(own).sum(), 1e-20))
     smoothed, variance = smooth(
         Array4f(*lanes(excess - even), lanes(own)), lanes(squared), guide, levels=LEVELS, deviations=None
     )
+    uneven = smoothed.xyz * (lanes(own) / dr.maximum(smoothed.w, 1e-20))
     difference = dr.square(dr.dot(smoothed.xyz, Array3f(*REC709_LUMINANCE)))
-    known = dr.select(difference > variance, 1.0 - variance / difference, 0.0)
-    uneven = smoothed.xyz * known * (lanes(own) / dr.maximum(smoothed.w, 1e-20))
-    found: F32 = np.maximum(color + even + image(uneven, *own.shape), np.float32(0))
-    found *= np.maximum(total(color + excess) / np.maximum(total(found), 1e-20), 0.0).astype(np.float32)
-    return found
+    known = image(dr.select(difference > variance, 1.0 - variance / difference, 0.0), *own.shape)[..., None]
+
+    # Surfaces have what is certain; what is left goes where nothing is.
+    certain = known * (even + image(uneven, *own.shape))
+    left = total(excess) - total(certain)
+    added = certain + proportional(np.where(left * total(excess) > 0.0, left, 0.0), (1 - known) * weight)
+    with_added: F32 = color + np.maximum(added, -np.maximum(color, np.float32(0)))
+    return with_added
 
 
 def _without_fireflies(color: F32, where: Mask) -> F32:

@@ -14,7 +14,7 @@ from enfilade.arrays import opaque
 from enfilade.cache import LruCache
 from enfilade.camera.path import CameraPath, Segment
 from enfilade.camera.pinhole import Camera
-from enfilade.kernels.estimate import Estimate, Radiance
+from enfilade.kernels.estimate import Confined, Estimate, Radiance
 from enfilade.kernels.guiding import PathGuide
 from enfilade.methods.analysis import keyframes_of
 from enfilade.methods.base import Inputs, Task
@@ -29,7 +29,6 @@ from enfilade.methods.decoupled.path_depth import KEYFRAMES, DepthWeights
 from enfilade.methods.decoupled.path_kernels import ENTRY_PX
 from enfilade.methods.decoupled.paths import Path, spawn
 from enfilade.methods.decoupled.reconstruction import ReconstructedEstimate
-from enfilade.methods.decoupled.surface_edges import OwnSurfaces
 from enfilade.methods.decoupled.surface_image import UploadedImage, blank_image
 from enfilade.methods.decoupled.virtual_images import VirtualImages
 from enfilade.methods.walkthrough import Walkthrough
@@ -128,7 +127,7 @@ class ShotContext:
         *,
         pixel_filter: PixelFilter = PixelFilter.CENTRE,
         layers: int = 2,
-        confined: OwnSurfaces | None = None,
+        confined: Confined | None = None,
     ) -> Estimate:
         """An estimate of pixels, without paths yet.
 
@@ -138,7 +137,7 @@ class ShotContext:
         where : (H, W) bool
             Pixels.
         confined
-            Those of them whose rays all meet the surface at their centre. None: no such pixels.
+            Of all pixels, as of :class:`Estimate`, with arrays of shape (H, W) and (H, W, 2).
         radiance, random, pixel_filter, layers
             As of :class:`Estimate`.
         """
@@ -150,8 +149,7 @@ class ShotContext:
             pixel_filter=pixel_filter,
             random=random,
             layers=layers,
-            confined=None if confined is None else confined.where[where],
-            meets_own=confined,
+            confined=None if confined is None else confined.of(where),
         )
 
     def reconstructed_estimate(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from enfilade.arrays import release_memory, to_float
-from enfilade.kernels.estimate import RayCount
+from enfilade.kernels.estimate import Confined, RayCount
 from enfilade.methods.decoupled.adaptive_sampling import (
     SPECULAR_CONTRAST,
     SPECULAR_DEVIATION,
@@ -27,7 +27,7 @@ from enfilade.methods.decoupled.sample_counts import specular_spp
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.specular_filter import filter_spatially, upload_aovs, with_edges
 from enfilade.methods.decoupled.specular_tint import find_tint
-from enfilade.methods.decoupled.surface_edges import OwnSurfaces, narrow_surfaces, surface_edges
+from enfilade.methods.decoupled.surface_edges import narrow_surfaces, own_sides, surface_edges
 from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
 from enfilade.records import F32, Geometry, Mask
 from enfilade.renderer import PixelFilter, Purpose
@@ -74,7 +74,7 @@ def shade_specular(
     # Narrow surfaces have more rays, but for those whose rays are traced at edges again.
     is_traced_later = in_mirrors | is_thin
     is_narrow = narrow_surfaces(is_edge, where) & ~is_traced_later
-    own = OwnSurfaces(shot.renderer, geometry, where & (is_edge | is_thin) & ~is_seen_in)
+    confined = Confined(where & (is_edge | is_thin) & ~is_seen_in, *own_sides(geometry))
     sampling = AdaptiveSampling.of(shot.walk, times=SPECULAR_DEVIATION, beneath=beneath)
     estimate = shot.estimate(
         geometry.camera,
@@ -83,7 +83,7 @@ def shade_specular(
         shot.walk.random(frame, Purpose.SPECULAR),
         pixel_filter=PixelFilter.GAUSSIAN,
         layers=SPECULAR_AOVS,
-        confined=own,
+        confined=confined,
     )
     spp = specular_spp(shot.settings, shot.frames)
     estimate.add(spp)
@@ -94,7 +94,7 @@ def shade_specular(
     release_memory()
 
     # Filter the AOVs along the surfaces that are seen in them, without the texture of metal.
-    tint = find_tint(shot, frame, where, own, is_narrow, spp)
+    tint = find_tint(shot, frame, where, confined, is_narrow, spp)
     if tint:
         traced[0] = tint.divided(traced[0])
         release_memory()
@@ -105,7 +105,7 @@ def shade_specular(
     )
     if tint:
         aovs[0] = tint.multiplied(aovs[0])
-    del traced
+    del traced, confined
 
     # Choose the edges: those in mirrors and panes, surfaces that centres miss, and those between surfaces
     # where the AOVs differ visibly. Aliasing is more visible than noise: its tolerance is a sixth of that of

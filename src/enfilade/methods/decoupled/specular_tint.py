@@ -12,11 +12,10 @@ import drjit as dr
 import numpy as np
 
 from enfilade.arrays import Array3f, to_float, to_half
-from enfilade.kernels.estimate import Samples
+from enfilade.kernels.estimate import Confined, Samples
 from enfilade.kernels.tone import luminance
 from enfilade.methods.decoupled.records import SpecularAov
 from enfilade.methods.decoupled.shot import ShotContext
-from enfilade.methods.decoupled.surface_edges import OwnSurfaces
 from enfilade.records import F32, Mask, Shading
 from enfilade.renderer import PixelFilter, Purpose, Rays
 
@@ -50,7 +49,7 @@ class Tint:
 
 
 def find_tint(
-    shot: ShotContext, frame: int, where: Mask, own: OwnSurfaces, narrow: Mask, spp: int
+    shot: ShotContext, frame: int, where: Mask, confined: Confined, narrow: Mask, spp: int
 ) -> Tint | None:
     """The tint of the pixels of a frame; None where no metal with a texture is seen.
 
@@ -60,8 +59,8 @@ def find_tint(
     frame
     where : (H, W) bool
         Pixels with specular rays.
-    own
-        Those whose rays all meet the surface at their centre.
+    confined
+        As of the specular rays.
     narrow : (H, W) bool
         Those that may have more rays than the first ones.
     spp
@@ -89,7 +88,7 @@ def find_tint(
         radiance,
         shot.walk.random(frame, Purpose.SPECULAR),
         pixel_filter=PixelFilter.GAUSSIAN,
-        confined=own,
+        confined=confined,
     )
     estimate.add(spp)
     is_textured = estimate.is_marked

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import drjit as dr
@@ -11,8 +12,7 @@ from enfilade.arrays import Array3f, Bool, Float, Int, UInt, image, lanes, opaqu
 from enfilade.kernels.rays import points_at
 from enfilade.methods.decoupled.edges import beside, dilated
 from enfilade.methods.decoupled.surface_image import PLANE_TOLERANCE
-from enfilade.records import Geometry, Mask
-from enfilade.renderer import Rays, Renderer
+from enfilade.records import F32, Geometry, Mask
 
 CREASE_COSINE = 0.9  # between the normals of two pixels, below which they show different surfaces
 RADIUS_PX = 2
@@ -39,6 +39,46 @@ def surface_edges(geometry: Geometry) -> tuple[Mask, Mask]:
     is_thin : (H, W) bool
         Fewer than :data:`MIN_SUPPORT` of the pixels around show the same one.
     """
+    compare = _comparison(geometry)
+    is_edge, support = Bool(False), UInt(0)
+    for down in range(-RADIUS_PX, RADIUS_PX + 1):
+        for across in range(-RADIUS_PX, RADIUS_PX + 1):
+            if not (down or across):
+                continue
+            # Pixels beyond the border count as the same surface.
+            is_same, is_inside = compare(down, across)
+            support += dr.select(is_same | ~is_inside, 1, 0)
+            if abs(down) + abs(across) == 1:
+                is_edge |= is_inside & ~is_same
+    is_thin = support < MIN_SUPPORT
+    dr.eval(is_edge, is_thin)
+    shape = geometry.shape_index.shape
+    return image(is_edge, *shape), image(is_thin, *shape)
+
+
+def own_sides(geometry: Geometry) -> tuple[F32, F32]:
+    """How far a pixel's surface goes on to its sides, in pixels: 1 where the next pixel shows it, else 0.
+
+    Parameters
+    ----------
+    geometry
+        Of shape (H, W).
+
+    Returns
+    -------
+    low, high : (H, W, 2) float32
+        To the left and above, 0 or less; to the right and below, 0 or more.
+    """
+    compare = _comparison(geometry)
+    sides = [
+        np.stack([image(Float(compare(*step)[0]), *geometry.shape_index.shape) for step in steps], axis=2)
+        for steps in (((0, -1), (-1, 0)), ((0, 1), (1, 0)))
+    ]
+    return -sides[0], sides[1]
+
+
+def _comparison(geometry: Geometry) -> Callable[[int, int], tuple[Any, Any]]:
+    """Tells of pixels some rows down and columns across: whether of the same surface, and in the image."""
     height, width = geometry.shape_index.shape
     _, column, row = pixel_grid(height, width)
     columns, rows = opaque(width, Int), opaque(height, Int)
@@ -46,86 +86,18 @@ def surface_edges(geometry: Geometry) -> tuple[Mask, Mask]:
     position = points_at(geometry.camera, depth)
     dr.eval(position)
 
-    is_edge, support = Bool(False), UInt(0)
-    for down in range(-RADIUS_PX, RADIUS_PX + 1):
-        for across in range(-RADIUS_PX, RADIUS_PX + 1):
-            if not (down or across):
-                continue
-            # Pixels beyond the border count as the same surface.
-            i, j = Int(column) + across, Int(row) + down
-            is_inside = (i >= 0) & (i < columns) & (j >= 0) & (j < rows)
-            tap = UInt(dr.clip(j, 0, rows - 1) * columns + dr.clip(i, 0, columns - 1))
+    def compare(down: int, across: int) -> tuple[Any, Any]:
+        i, j = Int(column) + across, Int(row) + down
+        is_inside = (i >= 0) & (i < columns) & (j >= 0) & (j < rows)
+        tap = UInt(dr.clip(j, 0, rows - 1) * columns + dr.clip(i, 0, columns - 1))
+        there, bent = dr.gather(Array3f, position, tap) - position, dr.gather(Array3f, normal, tap)
+        tolerance = PLANE_TOLERANCE * dr.minimum(depth, dr.gather(Float, depth, tap))
+        is_same = dr.gather(UInt, index, tap) == index
+        is_flat = (dr.dot(bent, normal) > CREASE_COSINE) & (dr.abs(dr.dot(there, normal)) <= tolerance)
+        is_flat &= dr.abs(dr.dot(there, bent)) <= tolerance
+        return is_same & (is_flat | (index == 0)), is_inside
 
-            # Compare the surfaces.
-            there, bent = dr.gather(Array3f, position, tap) - position, dr.gather(Array3f, normal, tap)
-            nearer = dr.minimum(depth, dr.gather(Float, depth, tap))
-            is_same = dr.gather(UInt, index, tap) == index
-            is_same &= _is_flat(there, normal, bent, nearer) | (index == 0)
-
-            # Count.
-            support += dr.select(is_same | ~is_inside, 1, 0)
-            if abs(down) + abs(across) == 1:
-                is_edge |= is_inside & ~is_same
-    is_thin = support < MIN_SUPPORT
-    dr.eval(is_edge, is_thin)
-    return image(is_edge, height, width), image(is_thin, height, width)
-
-
-def _is_flat(between: Any, one: Any, other: Any, depth: Any) -> Any:
-    """Whether two points lie in the tangent planes of each other, and their normals agree; Bool.
-
-    Parameters
-    ----------
-    between : Array3f
-        Vector from one point to the other.
-    one, other : Array3f
-        Normals.
-    depth : Float
-        Of the nearer point.
-    """
-    tolerance = PLANE_TOLERANCE * depth
-    is_within = (dr.abs(dr.dot(between, one)) <= tolerance) & (dr.abs(dr.dot(between, other)) <= tolerance)
-    return is_within & (dr.dot(one, other) > CREASE_COSINE)
-
-
-class OwnSurfaces:
-    """Surfaces at the centres of a G-buffer's pixels; called with camera rays, tells whether they meet them.
-
-    Parameters
-    ----------
-    renderer
-    geometry
-        Of shape (H, W).
-    where : (H, W) bool
-        Pixels whose rays are confined to them.
-    """
-
-    def __init__(self, renderer: Renderer, geometry: Geometry, where: Mask) -> None:
-        self.where = where
-        self._renderer, self._camera = renderer, geometry.camera
-        self._indices, self._depths = lanes(geometry.shape_index), lanes(geometry.depth)
-        self._normals = lanes(geometry.normal)
-
-    def __call__(self, pixel: Any, rays: Rays) -> Any:
-        """Whether camera rays meet the surface at the centre of a pixel.
-
-        Parameters
-        ----------
-        pixel : UInt
-            Flat indices.
-        rays
-            With directions of unit depth.
-
-        Returns
-        -------
-        Bool
-        """
-        seen = self._renderer.surfaces(rays)
-        depth = dr.gather(Float, self._depths, pixel)
-        between = rays.origin + seen.distance * rays.direction - points_at(self._camera, depth, pixel)
-        normal = dr.gather(Array3f, self._normals, pixel)
-        is_same = seen.is_hit & (seen.shape_index == dr.gather(UInt, self._indices, pixel))
-        return Bool(is_same & _is_flat(between, normal, seen.normal, dr.minimum(depth, seen.distance)))
+    return compare
 
 
 def narrow_surfaces(is_edge: Mask, where: Mask) -> Mask:

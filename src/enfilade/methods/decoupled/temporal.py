@@ -12,7 +12,6 @@ from dataclasses import replace
 
 import drjit as dr
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from enfilade.arrays import Array3f, Float, image, lanes, opaque, to_float, to_half, vector3
 from enfilade.cache import LruCache
@@ -26,7 +25,7 @@ from enfilade.methods.decoupled.sample_counts import REACH
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.surface_image import MIN_FOUND_WEIGHT, UploadedImage, lookup, upload_layers
 from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
-from enfilade.records import F32, Frame, Geometry, Mask, Provenance, SurfaceClass
+from enfilade.records import F32, U32, Frame, Geometry, Mask, Provenance, SurfaceClass
 
 MAX_DIFFERENCE = 3.0  # standard deviations, at which the weight of another frame falls to 1/e
 # Times the variance of a value, above which that of another frame lowers its weight: a dark pixel
@@ -84,7 +83,9 @@ class TemporalAccumulation:
             neighbours = [(other, weights[f]) for f, other in displayed.items()]
             color = accumulate_refined(geometry, color, here, neighbours, white=white, unit=unit / white)
 
-        return Frame(np.float32(shot.stored_unit) * without_negative(color), shaded.provenance)
+        return Frame(
+            np.float32(shot.stored_unit) * without_negative(color, geometry.shape_index), shaded.provenance
+        )
 
     def _displayed_image(self, shot: ShotContext, frame: int) -> UploadedImage:
         """A shaded frame as it is displayed, on the device."""
@@ -117,17 +118,27 @@ class TemporalAccumulation:
         return self._virtual.get(frame, lambda: shot.virtual_images.find(shot.walk.view(frame).geometry))
 
 
-def without_negative(color: F32) -> F32:
+def without_negative(color: F32, shape_index: U32) -> F32:
     """An image without light below zero, which is noise of specular lobes that are a difference.
 
-    Pixels whose luminance is below zero would be black dots: they take the mean of those of the eight around
-    whose luminance is not.
+    Pixels whose luminance is below zero would be black dots: they take the mean of the pixels of the same
+    shape around, if that is above zero.
+
+    Parameters
+    ----------
+    color : (H, W, 3) float32
+    shape_index : (H, W) uint32
     """
-    is_below = luminance(color) < 0.0
-    light: F32 = np.where(is_below[..., None], np.float32(0), np.maximum(color, np.float32(0)))
-    around = sliding_window_view(np.pad(light, ((1, 1), (1, 1), (0, 0))), (3, 3), axis=(0, 1))[is_below]
-    count = sliding_window_view(np.pad(~is_below, 1), (3, 3))[is_below].sum(axis=(1, 2))
-    light[is_below] = around.sum(axis=(2, 3)) / np.maximum(count, 1)[:, None]
+    light: F32 = np.maximum(color, np.float32(0))
+    row, column = (index[:, None] for index in np.nonzero(luminance(color) < 0.0))
+    down, across = (np.delete(step.ravel(), 4) for step in np.mgrid[-1:2, -1:2])
+    height, width = shape_index.shape
+    beside = np.clip(row + down, 0, height - 1), np.clip(column + across, 0, width - 1)
+    is_same = (beside[0] == row + down) & (beside[1] == column + across)
+    is_same &= shape_index[beside] == shape_index[row, column]
+    total = np.sum(color[beside], axis=1, where=is_same[..., None])
+    count = np.maximum(is_same.sum(axis=1, keepdims=True), 1)
+    light[row[:, 0], column[:, 0]] = np.maximum(total / count, np.float32(0))
     return light
 
 
