@@ -94,6 +94,14 @@ def test_uncertain_pixels_agree_with_a_numpy_twin(exposure_ev):
     np.testing.assert_array_equal(found[is_decided], (sampled & (expected > tolerance))[is_decided])
 
 
+def test_means_below_zero_are_as_uncertain_as_those_above():
+    """Black pixels of lobes that are a difference got no more rays."""
+    mean, variance = np.array([[-0.7, 0.7, -0.7, -0.1]]), np.array([[0.04, 0.04, 0.0, 0.04]])
+    everywhere, beneath = np.ones((1, 4), bool), np.array([[0.0, 0.0, 0.0, 0.3]], np.float32)
+    found = AdaptiveSampling(128, 0.02, 0.0, beneath).uncertain(Means(everywhere, mean, variance), everywhere)
+    assert found.tolist() == [[True, True, False, True]]
+
+
 def test_without_pixels_none_is_uncertain():
     nowhere = np.zeros((H, W), bool)
     assert not AdaptiveSampling(128, 0.0, 0.0).uncertain(None, nowhere).any()

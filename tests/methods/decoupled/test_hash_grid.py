@@ -279,6 +279,20 @@ def test_samples_that_are_not_finite_are_left_out():
     np.testing.assert_array_equal(entries.sums, [[4.0, 4.0, 4.0]])
 
 
+def test_entries_at_which_lookups_find_others_are_left_out():
+    def entry(*chain):
+        return Entries.of([np.array([key], np.uint64) for key in chain], np.ones((1, 3)))
+
+    # Of the chains from an entry to the larger ones around it, the last one of which is not looked up.
+    others = entry(7, 100, 101, 102)
+    beside = entry(1, 2, 3, 7)
+    within, same = entry(4, 5, 7, 6), entry(7, 8, 9, 10)
+    left = Entries.joined([beside, within, same]).without(others)
+    assert left.keys.tolist() == [1]
+    np.testing.assert_array_equal(left.larger, [[2, 3, 7]])
+    np.testing.assert_array_equal(left.sums, np.ones((1, 3)))
+
+
 @pytest.mark.parametrize("count", [0, MIN_SAMPLES - 1])
 def test_entries_of_few_samples_are_not_uploaded(count):
     entries = Entries.joined([entries_of(np.full(count, 9, np.uint64), np.ones((count, 3)))])

@@ -84,6 +84,19 @@ def test_sharp_light_is_apart(tmp_path):
     assert whole.mean() / 0.8 == pytest.approx(soft[0] + sharp, rel=0.05)
 
 
+def test_of_mirrors_alone_it_is_the_light_of_what_they_show(tmp_path):
+    scene = SCENE.format(max_depth=5).replace('"dielectric"', '"conductor"')
+    file = tmp_path / "scene.xml"
+    file.write_text(scene)
+    renderer, close = MitsubaRenderer(file), Camera(look_at((0, 0, 1.3), (0, 0, 0)), 20.0, *SIZE)
+    geometry, key = find_geometry(renderer, close), RandomKey(1, MIDDLE, Purpose.DEPTHS)
+    assert not geometry.has_diffuse.any()
+    shot = ShotContext(0, [Segment(0, len(PATH) - 1)], None, walk_of(PATH, renderer), None, None)
+    light, _ = light_by_depth(renderer, geometry, None, key, shot.estimate)
+    soft, wide = np.array(light[:-1]), light_of(renderer)[:-1]
+    np.testing.assert_allclose(soft[1:] / soft[:-1], wide[1:] / wide[:-1], rtol=0.15)  # other walls
+
+
 def test_only_scenes_that_limit_the_depth_of_paths_need_it(tmp_path):
     assert room_with_a_ball_of_glass(tmp_path, 8).max_path_depth() == 8
     assert room_with_a_ball_of_glass(tmp_path, -1).max_path_depth() == UNLIMITED

@@ -40,7 +40,7 @@ def test_tasks_of_long_shots_cost_less_than_those_of_an_excerpt():
     ratios = Decoupled().cost_ratios(Settings(), 320 * 180, excerpt, whole, shots=2)
     settings = DecoupledSettings()
     expected = irradiance_spp(settings, 30) / irradiance_spp(settings, 2)
-    same = dict.fromkeys(("prepass", "hash_grid"), 1.0)
+    same = dict.fromkeys(("prepass", "hash_grid", "virtual_images"), 1.0)
     same["shading"] = 0.5 + 0.5 * specular_spp(settings, 240) / specular_spp(settings, 4)
     assert expected < 0.3
     assert ratios == pytest.approx(same | {"irradiance": expected, "disocclusion": expected})

@@ -3,11 +3,16 @@
 Less noise, no light of a bright sky, no mix of frames that differ.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from enfilade.camera.path import CameraPath
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry
+from enfilade.methods.base import FRAMES, TaskId
+from enfilade.methods.decoupled import Decoupled
 from enfilade.methods.decoupled.records import SpecularAov
 from enfilade.methods.decoupled.temporal import (
     accumulate_refined,
@@ -19,6 +24,7 @@ from enfilade.methods.decoupled.temporal import (
 )
 from support.analytic_truth import geometry_of
 from support.example_scenes import wall
+from support.in_memory import run_passes, walk_of
 from support.material_scene import MATERIALS, front_camera, opened_scene
 
 WIDTH, HEIGHT = 96, 64
@@ -157,3 +163,23 @@ def test_noise_about_zero_is_not_brightened_by_the_pixels_around():
     found = without_negative(color, np.ones((HEIGHT, WIDTH), np.uint32))
     assert found.min() >= 0.0
     assert found.mean() < 1.25 * np.maximum(color, 0.0).mean()
+
+
+def test_pixels_far_below_zero_take_the_light_of_other_frames(tmp_path):
+    """One negative path made a black cross: all pixels around it of the same surface are below zero, too."""
+    renderer = opened_scene(tmp_path, {"ball": MATERIALS["diffuse"]})
+    cameras = tuple(front_camera(x=x) for x in np.linspace(0.0, 0.02, 3))
+    walk, method = walk_of(CameraPath(cameras, (1, 2, 3), 24.0), renderer), Decoupled()
+    results, here = run_passes(method, walk), TaskId("shading", 1)
+    task = next(t for t in method.tasks(results.analysis) if t.id == TaskId(FRAMES, 1))
+    before, shaded = results.colors[1], results.records[here]
+    row, column = (size // 2 for size in shaded.provenance.shape)
+    cross = np.s_[row - 1 : row + 2, column - 1 : column + 2]
+    assert before[cross].min() > 0.0
+    diffuse, deviation = shaded.diffuse.copy(), np.zeros_like(shaded.deviation)
+    diffuse[cross] = -0.1
+    diffuse[row, column], deviation[cross] = -1.0, 1.0
+    results.records[here] = replace(shaded, diffuse=diffuse, deviation=deviation)
+    found = method.run(task, results, walk).records[1].color
+    assert np.all(found[cross] > 0.5 * before[cross])
+    assert np.all(found[cross] < 1.1 * before[cross])

@@ -15,7 +15,7 @@ from enfilade.methods.decoupled.integrator import Integrator
 from enfilade.methods.decoupled.paths import spawn
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.virtual_images import CHOICES, IN_VIRTUAL_IMAGE, TRANSMIT, VirtualImages
-from enfilade.methods.decoupled.virtual_irradiance import trace_virtual_images
+from enfilade.methods.decoupled.virtual_irradiance import estimate_virtual_images
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
 from support.in_memory import InMemory, run_passes, walk_of
@@ -151,7 +151,7 @@ def test_lookups_between_the_centres_of_pixels_find_the_light_of_virtual_images(
     output = method.run(task, results, walk)
     results.records[task.id], results.task_metadata[task.id] = output.records[0], dict(output.metadata)
     shot = ShotContext(0, [Segment(0, 0)], results, walk, Integrator(renderer), VirtualImages(renderer))
-    grid = trace_virtual_images(shot, 0)[0].upload()
+    grid = estimate_virtual_images(shot, 0, shot.prepass_cache(0))[0].upload()
 
     virtual = shot.virtual_images.find(shot.images.virtual_geometry(0))[CHOICES.index(TRANSMIT)]
     pixels = np.repeat(np.flatnonzero(virtual.shape_index == IN_VIRTUAL_IMAGE + 1), 8)

@@ -114,10 +114,17 @@ class AdaptiveSampling:
         return found & among
 
     def _exceeds(self, low: Any, high: Any, pixel: Any) -> Any:
-        """Whether two luminances of pixels (UInt, flat indices) differ by twice the tolerance; Bool."""
+        """Whether two luminances of pixels (UInt, flat indices) differ by twice the tolerance; Bool.
+
+        What is far below zero, as a lobe that is a difference may be by chance, is as uncertain as what is
+        far above, though it is displayed as black.
+        """
         of = self.beneath
         beneath = dr.gather(Float, lanes(of), pixel) if isinstance(of, np.ndarray) else opaque(float(of))
-        deviation = displayed_deviation(low + beneath, high + beneath, self.exposure_ev, white=self.white)
+        low, high = low + beneath, high + beneath
+        is_below = low + high < 0.0
+        low, high = dr.select(is_below, -high, low), dr.select(is_below, -low, high)
+        deviation = displayed_deviation(low, high, self.exposure_ev, white=self.white)
         return deviation > opaque(self.tolerance)
 
     def refine(self, estimate: Estimate, sampled: Mask, edges: Mask, within: Mask, spp: int) -> Mask:

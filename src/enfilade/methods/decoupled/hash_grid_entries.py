@@ -84,6 +84,12 @@ class Entries:
         sums, squares, counts = (np.multiply(of, weight) for of in (self.sums, self.squares, self.counts))
         return replace(self, sums=sums, squares=squares, counts=counts)
 
+    def without(self, others: Entries) -> Entries:
+        """The entries at which a lookup finds none of some others."""
+        chain = np.column_stack([self.keys, self.larger[:, : LEVELS - 1]])
+        own = ~np.isin(chain, others.keys).any(axis=1)
+        return Entries(self.keys[own], self.sums[own], self.squares[own], self.counts[own], self.larger[own])
+
     @staticmethod
     def joined(parts: Sequence[Entries]) -> Entries:
         """Sum up several lists of entries; of none, the empty list."""

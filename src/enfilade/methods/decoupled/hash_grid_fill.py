@@ -7,14 +7,16 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from enfilade.kernels.estimate import RayCount
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.hash_grid_entries import Entries
-from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
+from enfilade.methods.decoupled.integrator import SPECULAR_AOVS, OnMiss
+from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from enfilade.methods.decoupled.light_camera import LIGHT_PIXELS, light_camera
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.virtual_images import IMAGING
-from enfilade.methods.decoupled.virtual_irradiance import trace_virtual_images
-from enfilade.records import F32
+from enfilade.methods.decoupled.virtual_irradiance import estimate_virtual_images
+from enfilade.records import F32, Geometry, Mask
 from enfilade.renderer import PixelFilter, Purpose
 
 SPECULAR_SPP = 4  # specular rays of each pixel of the light camera
@@ -39,31 +41,13 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
     def collect(levels: list[npt.NDArray[np.uint64]], irradiance: F32) -> None:
         parts.append(Entries.of(levels, irradiance, unit=shot.unit))
 
-    # Path trace the surfaces that mirrors and panes show.
-    virtual, count = trace_virtual_images(shot, frame)
-
-    # Follow specular lobes from all pixels of the frame; those of mirrors and panes add no noisier estimates.
-    random = walk.random(frame, Purpose.HASH_GRID)  # of two lists of pixels that have none in common
-    forms_image = np.isin(geometry.surface, IMAGING).ravel()
-    with_virtual = replace(cache, hash_grid=virtual.upload())
-    for pixels, known in ((~forms_image, cache), (forms_image, with_virtual)):
-        specular = shot.estimate(
-            camera,
-            pixels,
-            lambda rays, sampler, known=known: shot.integrator.specular_radiance(
-                known, shot.spawn(frame, rays, sampler), collect
-            ),
-            random,
-            pixel_filter=PixelFilter.BOX,
-            layers=SPECULAR_AOVS,
-        )
-        specular.add(SPECULAR_SPP)
-        count += specular.count
+    # Follow specular lobes; those of mirrors and panes have a pass of their own.
+    count = follow_specular(shot, frame, ~forms_image(geometry), cache, collect)
 
     # See what prepass images don't show: surfaces that are clear for the most part, and thin ones.
     seen = shot.estimate(
         camera,
-        np.ones(camera.width * camera.height, np.bool_),
+        np.ones((camera.height, camera.width), np.bool_),
         lambda rays, sampler: shot.integrator.diffuse_radiance(
             cache, shot.spawn(frame, rays, sampler), collect
         ),
@@ -85,6 +69,52 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
     gathered.add(gather_spp(camera.width * camera.height))
 
     # Sum up the estimates by entry.
-    entries = Entries.joined([*parts, virtual])
     count += seen.count + gathered.count
-    return Output({frame: entries}, {"rays": {"hash_grid": count.rays}, "dropped": count.dropped})
+    return Output(
+        {frame: Entries.joined(parts)}, {"rays": {"hash_grid": count.rays}, "dropped": count.dropped}
+    )
+
+
+def fill_from_images(shot: ShotContext, frame: int) -> Output:
+    """Estimate irradiance where mirrors and panes of a keyframe show surfaces that no prepass image shows."""
+    parts: list[Entries] = []
+    if not forms_image(shot.images.virtual_geometry(frame)).any():
+        return Output({frame: Entries.joined(parts)}, {"rays": {"virtual_images": 0}, "dropped": 0})
+    prepass = shot.prepass_cache(frame)
+
+    def collect(levels: list[npt.NDArray[np.uint64]], irradiance: F32) -> None:
+        parts.append(Entries.of(levels, irradiance, unit=shot.unit))
+
+    # Follow their specular lobes.
+    count = follow_specular(shot, frame, forms_image(shot.images.light_geometry(frame)), prepass, collect)
+    single = Entries.joined(parts)
+
+    # Estimate what they show together; the noisier estimates of single paths are not added there.
+    cache = replace(prepass, hash_grid=shot.incomplete_hash_grid(frame, single))
+    virtual, own = estimate_virtual_images(shot, frame, cache)
+    count += own
+    entries = Entries.joined([virtual, single.without(virtual)])
+    return Output({frame: entries}, {"rays": {"virtual_images": count.rays}, "dropped": count.dropped})
+
+
+def forms_image(geometry: Geometry) -> Mask:
+    """Pixels of mirrors and panes; (H, W) bool."""
+    return np.isin(geometry.surface, IMAGING)
+
+
+def follow_specular(
+    shot: ShotContext, frame: int, where: Mask, cache: IrradianceCache, collect: OnMiss
+) -> RayCount:
+    """Follow specular lobes from pixels of a keyframe to what the cache misses."""
+    estimate = shot.estimate(
+        light_camera(shot.walk.path.cameras[frame]),
+        where,
+        lambda rays, sampler: shot.integrator.specular_radiance(
+            cache, shot.spawn(frame, rays, sampler), collect
+        ),
+        shot.walk.random(frame, Purpose.HASH_GRID),
+        pixel_filter=PixelFilter.BOX,
+        layers=SPECULAR_AOVS,
+    )
+    estimate.add(SPECULAR_SPP)
+    return estimate.count

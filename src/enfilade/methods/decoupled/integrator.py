@@ -88,7 +88,7 @@ class Integrator:
     Attributes
     ----------
     irradiance_layers : int
-        Of path traced irradiance, see :meth:`path_traced`.
+        Of :meth:`gathered` and :meth:`path_traced`.
     """
 
     def __init__(self, renderer: LobeRenderer) -> None:
@@ -202,25 +202,14 @@ class Integrator:
             Two layers: by light straight from emitters, without next-event estimates of those that cast
             sharp shadows; and by all other.
         """
-        direct, vertex = self.kernels.gather(cache, path)
-        light, deferred = Contributions(dr.width(path.lane)), _Deferred()
-        # An empty cache leaves a literal zero, whose size a recorded kernel does not adapt.
-        if cache.view or cache.hash_grid:
-            light.add_once(vertex.radiance, vertex.path.lane)
-        deferred.add_missed(vertex)
-        onward = replace(vertex.path, throughput=vertex.onward)
-        onward = compact(onward, dr.compress(onward.is_active))
-        self._trace_specular(light, cache, onward, deferred)
-        self._finish(light, cache, deferred, on_miss)
-        return Samples((direct, light.summed()))
+        return Samples(self._gathered(cache, path, dr.width(path.lane), on_miss))
 
-    def path_traced(self, cache: IrradianceCache, path: Path, count: int) -> Samples:
-        """Irradiance over pi at the next surfaces of paths, path traced.
+    def gathered(self, cache: IrradianceCache, path: Path, count: int) -> Samples:
+        """Irradiance over pi at the next surfaces of paths, as by :meth:`final_gather`.
 
         Parameters
         ----------
         cache
-            For its path guide.
         path
             On their way to the surfaces; at most one a lane.
         count
@@ -231,12 +220,40 @@ class Integrator:
         Samples
             Layers of all light, and without emitters that cast sharp shadows where the scene has any.
         """
+        if not dr.width(path.lane):
+            return Samples(tuple(dr.zeros(Array3f, count) for _ in range(self.irradiance_layers)))
+        soft = Array3f(sum(self._gathered(cache, path, count)))
+        if self.irradiance_layers == 1:
+            return Samples((soft,))
+        whole = Array3f(soft)
+        scatter_add(whole, self.kernels.sharp_light(path), path.lane)
+        return Samples((whole, soft))
+
+    def path_traced(self, cache: IrradianceCache, path: Path, count: int) -> Samples:
+        """The same, path traced; of the cache, the path guide is used."""
         found = tuple(dr.zeros(Array3f, count) for _ in range(self.irradiance_layers))
         if dr.width(path.lane):
             _, irradiance, _ = self.kernels.estimate(cache.path_guide, cache.depth_weights.of_entries, path)
             for layer, of in zip(found, irradiance, strict=True):
                 scatter_add(layer, of, path.lane)
         return Samples(found)
+
+    def _gathered(
+        self, cache: IrradianceCache, path: Path, count: int, on_miss: OnMiss | None = None
+    ) -> tuple[Any, Any]:
+        """Both layers of :meth:`final_gather` by lane, of `count` lanes."""
+        emitted, vertex = self.kernels.gather(cache, path)
+        direct, light, deferred = dr.zeros(Array3f, count), Contributions(count), _Deferred()
+        scatter_add(direct, emitted, path.lane)
+        # An empty cache leaves a literal zero, whose size a recorded kernel does not adapt.
+        if cache.view or cache.hash_grid:
+            light.add_once(vertex.radiance, vertex.path.lane)
+        deferred.add_missed(vertex)
+        onward = replace(vertex.path, throughput=vertex.onward)
+        onward = compact(onward, dr.compress(onward.is_active))
+        self._trace_specular(light, cache, onward, deferred)
+        self._finish(light, cache, deferred, on_miss)
+        return direct, light.summed()
 
     def _trace_specular(
         self,

@@ -8,7 +8,7 @@ from enfilade.camera.path import Segment
 from enfilade.methods.analysis import Analysis, keyframes_of
 from enfilade.methods.base import FRAMES, Inputs, Method, Output, Pass, Task, TaskId
 from enfilade.methods.decoupled.hash_grid_entries import Entries
-from enfilade.methods.decoupled.hash_grid_fill import fill_hash_grid
+from enfilade.methods.decoupled.hash_grid_fill import fill_from_images, fill_hash_grid
 from enfilade.methods.decoupled.integrator import Integrator
 from enfilade.methods.decoupled.irradiance import fill_disocclusions, gather_keyframe
 from enfilade.methods.decoupled.light_camera import light_reduction
@@ -31,6 +31,7 @@ from enfilade.settings import (
     ViewingSettings,
 )
 
+LIGHT = "prepass", "hash_grid", "virtual_images"  # passes before final gathers
 SPACING = 8  # of keyframes, frames
 SPECULAR_SHARE = 0.5  # of the cost of an excerpt's shading, for forecasts: 0 without specular lobes
 
@@ -44,21 +45,17 @@ class Decoupled(Method):
     """Irradiance cached at keyframes; visibility, texture, edges and specular lobes in every frame."""
 
     name = "decoupled"
-    revision = 52
+    revision = 53
     needs_lobes = True
     has_tone_curve = True
     settings = (TraceSettings, ViewingSettings, KeyframeSettings, DecoupledSettings)
     passes = (
         Pass("prepass", IrradianceImage),
         Pass("hash_grid", Entries, reads=("prepass",), is_barrier=True),
-        Pass("irradiance", IrradianceImage, reads=("prepass", "hash_grid"), is_barrier=True),
-        Pass("disocclusion", IrradianceImage, reads=("prepass", "hash_grid", "irradiance"), is_barrier=True),
-        Pass(
-            "shading",
-            ShadedFrame,
-            reads=("prepass", "hash_grid", "irradiance", "disocclusion"),
-            is_barrier=True,
-        ),
+        Pass("virtual_images", Entries, reads=("prepass", "hash_grid"), is_barrier=True),
+        Pass("irradiance", IrradianceImage, reads=LIGHT, is_barrier=True),
+        Pass("disocclusion", IrradianceImage, reads=(*LIGHT, "irradiance"), is_barrier=True),
+        Pass("shading", ShadedFrame, reads=(*LIGHT, "irradiance", "disocclusion"), is_barrier=True),
         Pass(FRAMES, Frame, reads=("shading",)),
     )
 
@@ -85,7 +82,7 @@ class Decoupled(Method):
     ) -> Mapping[str, float]:
         """Cached light of large frames has fewer pixels; short shots need more paths and specular rays."""
         share = 1.0 / light_reduction(pixels) ** 2
-        ratios = dict.fromkeys(("prepass", "hash_grid", "irradiance", "disocclusion"), share)
+        ratios = dict.fromkeys((*LIGHT, "irradiance", "disocclusion"), share)
         spp, in_excerpt = (
             irradiance_spp(settings[DecoupledSettings], keyframes)
             for keyframes in (whole["irradiance"] / shots, excerpt["irradiance"])
@@ -103,7 +100,7 @@ class Decoupled(Method):
         shots = zip(path.shots(), _segments(analysis), strict=True)
         for number, (shot, segments) in enumerate(shots):
             keyframes = keyframes_of(segments)
-            for pass_name in ("prepass", "hash_grid", "irradiance"):
+            for pass_name in (*LIGHT, "irradiance"):
                 for frame in keyframes:
                     yield Task(pass_name, frame, number)
             for segment in segments:
@@ -122,6 +119,8 @@ class Decoupled(Method):
                 return trace_prepass(shot, frame)
             case "hash_grid":
                 return fill_hash_grid(shot, frame)
+            case "virtual_images":
+                return fill_from_images(shot, frame)
             case "irradiance":
                 return gather_keyframe(shot, frame)
             case "disocclusion":

@@ -86,6 +86,8 @@ def light_by_depth(
 ) -> tuple[list[float], RayCount]:
     """Mean luminance of irradiance over pi, by the same paths ended as if they began at each depth.
 
+    It is that of visible surfaces; if none has a diffuse lobe, that of the surfaces to which a bounce leads.
+
     Parameters
     ----------
     renderer
@@ -100,16 +102,20 @@ def light_by_depth(
     -------
     light : list of float
         Without sharp light, one a depth; then that of sharp light, which has the same at each. Multiplied by
-        the number of pixels with a diffuse lobe.
+        the number of pixels that it represents.
     count : RayCount
     """
-    pixels = np.flatnonzero(geometry.has_diffuse)
+    is_direct = bool(geometry.has_diffuse.any())
+    pixels = np.flatnonzero(geometry.has_diffuse if is_direct else geometry.shape_index)
     chosen = np.zeros_like(geometry.has_diffuse)
     chosen.flat[pixels[np.linspace(0, len(pixels) - 1, min(len(pixels), PIXELS)).astype(np.intp)]] = True
     has_sharp_light = renderer.has_sharp_light()
 
     def radiance(rays: Any, sampler: Any) -> Samples:
         point = renderer.intersect(rays, opaque_only=True)
+        if not is_direct:
+            bounced = renderer.sample_specular(point, sampler)
+            point = renderer.intersect(bounced.rays, bounced.bounce, bounced.is_alive)
         soft = [
             sum(
                 renderer.estimate_diffuse(

@@ -92,6 +92,8 @@ class PathKernels:
         Keys in the hash grid.
     query_further
         The rest of the cache.
+    sharp_light
+        Irradiance by emitters that cast sharp shadows.
     estimate
         Path traced irradiance.
     terminate
@@ -108,6 +110,7 @@ class PathKernels:
         self.extend = recorded(self._extend, state)
         self.gather = recorded(self._gather, state)
         self.find_entries = recorded(self._find_entries, state)
+        self.sharp_light = recorded(self._sharp_light, state)
         self.estimate = recorded(self._estimate, state)
         self.terminate = recorded(self._terminate, state)
 
@@ -260,6 +263,12 @@ class PathKernels:
             Bool(is_diffuse & is_known),
             Bool(is_diffuse & ~is_known),
         )
+
+    def _sharp_light(self, path: Path) -> Any:
+        """Irradiance over pi at the next surface, by emitters that cast sharp shadows; Array3f."""
+        point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
+        sharp, _ = self._renderer.sharp_light(point, path.sampler.fork(SHARP_SALT))
+        return Array3f(dr.select(path.is_active, sharp, 0.0))
 
     def _estimate(
         self, guide: PathGuide | None, depth_weights: tuple[Any, Any], path: Path

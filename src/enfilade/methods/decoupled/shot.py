@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -80,7 +80,7 @@ class ShotContext:
         self.virtual_images = virtual_images
         self.settings = walk.settings[DecoupledSettings]
         self.images = ImageStore(segments, inputs, walk)
-        self._entries: LruCache[int, Entries] = LruCache(HASH_GRID_KEYFRAMES)
+        self._entries: LruCache[tuple[str, int], Entries] = LruCache(2 * HASH_GRID_KEYFRAMES)
         self._hash_grid: tuple[dict[int, float], HashGrid | None] = ({}, None)
         self._path_guides: LruCache[int, PathGuide | None] = LruCache(2)
         self._blank: list[UploadedImage] = []
@@ -200,12 +200,23 @@ class ShotContext:
         """The hash grid near a frame."""
         weights = hash_grid_weights(self.walk.path, self.keyframes, frame)
         if self._hash_grid[0] != weights:
-            parts = [
-                self._entries.get(k, lambda k=k: self.inputs.record("hash_grid", k)).weighted(weight)  # type: ignore[misc]
-                for k, weight in weights.items()
-            ]
-            self._hash_grid = weights, Entries.joined(parts).upload()
+            self._hash_grid = weights, self._joined_entries(weights, ("hash_grid", "virtual_images")).upload()
         return self._hash_grid[1]
+
+    def incomplete_hash_grid(self, frame: int, more: Entries) -> HashGrid | None:
+        """The hash grid before virtual images are gathered, with some more entries."""
+        weights = hash_grid_weights(self.walk.path, self.keyframes, frame)
+        return Entries.joined([self._joined_entries(weights, ("hash_grid",)), more]).upload()
+
+    def _joined_entries(self, weights: Mapping[int, float], passes: Sequence[str]) -> Entries:
+        """Entries of keyframes from some passes, weighted."""
+        return Entries.joined(
+            [
+                self._entries.get((name, k), partial(self.inputs.record, name, k)).weighted(weight)
+                for k, weight in weights.items()
+                for name in passes
+            ]
+        )
 
     def shading_cache(self, frame: int) -> IrradianceCache:
         """The irradiance images near a frame, reprojected to its view, and the hash grid.

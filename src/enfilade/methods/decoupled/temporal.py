@@ -75,6 +75,7 @@ class TemporalAccumulation:
                 color = color + accumulate_temporally(geometry, here, neighbours, unit=unit)
 
         # Average refined pixels.
+        color = without_negative(color, geometry.shape_index)
         if shaded.deviation.any():
             displayed = {f: self._displayed_image(shot, f) for f in frames}
             shown, where = displayed.pop(frame), shaded.deviation > 0
@@ -83,17 +84,16 @@ class TemporalAccumulation:
             neighbours = [(other, weights[f]) for f, other in displayed.items()]
             color = accumulate_refined(geometry, color, here, neighbours, white=white, unit=unit / white)
 
-        return Frame(
-            np.float32(shot.stored_unit) * without_negative(color, geometry.shape_index), shaded.provenance
-        )
+        return Frame(np.float32(shot.stored_unit) * color, shaded.provenance)
 
     def _displayed_image(self, shot: ShotContext, frame: int) -> UploadedImage:
         """A shaded frame as it is displayed, on the device."""
 
         def make() -> UploadedImage:
             shaded, virtual = self._record(shot, frame), self._virtual_geometry(shot, frame)
+            color = without_negative(shaded.color, shot.walk.view(frame).geometry.shape_index)
             deviation = to_float(shaded.deviation)
-            return upload_displayed(virtual, shaded.color, deviation, white=shot.white / shot.stored_unit)
+            return upload_displayed(virtual, color, deviation, white=shot.white / shot.stored_unit)
 
         return self._displayed.get(frame, make)
 

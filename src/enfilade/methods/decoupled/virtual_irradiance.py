@@ -6,54 +6,52 @@ one by one stays noisy in the hash grid, whose entries are too small for many of
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import drjit as dr
 import numpy as np
 
-from enfilade.arrays import lanes, rows
-from enfilade.kernels.estimate import RayCount, Samples
+from enfilade.arrays import UInt, lanes, rows
+from enfilade.kernels.estimate import Estimate, RayCount, Samples
 from enfilade.kernels.random import one_sequence
 from enfilade.kernels.rays import camera_rays, pixel_centres
-from enfilade.methods.decoupled.denoising import NOISE_SHARE, OUTLIER, denoise_light
+from enfilade.methods.decoupled.denoising import OUTLIER, denoise_light
 from enfilade.methods.decoupled.hash_grid import LEVELS
 from enfilade.methods.decoupled.hash_grid_entries import Entries
+from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from enfilade.methods.decoupled.paths import WITHIN, Path
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.virtual_images import CHOICES, IN_VIRTUAL_IMAGE
-from enfilade.records import Geometry, Shading
+from enfilade.records import F32, Geometry, Mask, Shading
 from enfilade.renderer import Purpose, Rays
 
 SPP = 16  # paths of a pixel (bathroom, staircase2)
+GATHER_SPP = 8  # gather rays of a pixel
 DENOISED_SAMPLES = 16  # estimates as which a denoised pixel counts
 
 
-def trace_virtual_images(shot: ShotContext, frame: int) -> tuple[Entries, RayCount]:
+def estimate_virtual_images(
+    shot: ShotContext, frame: int, cache: IrradianceCache
+) -> tuple[Entries, RayCount]:
     """Estimate irradiance where mirrors and panes of a keyframe show surfaces that no prepass image shows.
 
-    It is not gathered from the cache: that has the light of paths that are one edge longer than those by way
-    of a mirror may be.
-
-    Parameters
-    ----------
-    shot
-    frame
-
-    Returns
-    -------
-    entries : Entries
-    count : RayCount
+    Path traced, it is too noisy where most light comes by several bounces. Gathered, it has the errors of the
+    cache, whose light near lamps that the camera does not see is coarse, and after several bounces has a mean
+    weight. So what is gathered is corrected as far as the difference exceeds its own noise.
     """
     images = shot.virtual_images.find(shot.images.virtual_geometry(frame))
-    traced = [_trace(shot, frame, *image) for image in zip(images, CHOICES, strict=True)]
-    entries = Entries.joined([found for found, _ in traced])
-    return entries, sum((count for _, count in traced), RayCount())
+    estimated = [_estimate(shot, frame, cache, *image) for image in zip(images, CHOICES, strict=True)]
+    entries = Entries.joined([found for found, _ in estimated])
+    return entries, sum((count for _, count in estimated), RayCount())
 
 
-def _trace(shot: ShotContext, frame: int, virtual: Geometry, choice: float) -> tuple[Entries, RayCount]:
+def _estimate(
+    shot: ShotContext, frame: int, cache: IrradianceCache, virtual: Geometry, choice: float
+) -> tuple[Entries, RayCount]:
     """Entries of a virtual image, and the number of rays."""
-    cache, camera = shot.prepass_cache(frame), virtual.camera
+    prepass, camera = shot.prepass_cache(frame), virtual.camera
 
     def seen_along(rays: Rays, sampler: Any) -> Path:
         return shot.virtual_images.seen_along(shot.spawn(frame, rays, sampler), choice)
@@ -65,7 +63,7 @@ def _trace(shot: ShotContext, frame: int, virtual: Geometry, choice: float) -> t
     path = seen_along(camera_rays(camera, pixel_centres(camera, lanes(pixels))), one_sequence(len(pixels)))
     if not dr.width(path.lane):
         return Entries.joined([]), RayCount()
-    keys, cached, is_known, is_missing = shot.integrator.kernels.find_entries(cache, path)
+    keys, cached, is_known, is_missing = shot.integrator.kernels.find_entries(prepass, path)
     chosen, lane = np.flatnonzero(np.array(is_missing)), np.array(path.lane)
     if not len(chosen):
         return Entries.joined([]), RayCount()
@@ -74,35 +72,36 @@ def _trace(shot: ShotContext, frame: int, virtual: Geometry, choice: float) -> t
     chosen = chosen[np.argsort(lane[chosen])]  # in the order of the pixels
     pixels = pixels[lane[chosen]]
 
-    # Estimate their irradiance.
-    def radiance(rays: Rays, sampler: Any) -> Samples:
-        return shot.integrator.path_traced(cache, seen_along(rays, sampler), dr.width(sampler.seed))
-
+    # Path trace their irradiance, which has noise, and gather it, which has the errors of the cache.
     is_traced = np.zeros(virtual.shape_index.shape, np.bool_)
     is_traced.flat[pixels] = True
-    random = shot.walk.random(frame, Purpose.VIRTUAL_IMAGES)
-    estimate = shot.estimate(camera, is_traced, radiance, random, layers=shot.integrator.irradiance_layers)
-    estimate.add(SPP)
 
-    # Denoise it; a denoised pixel is as reliable as many samples.
-    layers, times = [shading.color for shading in estimate.shadings], 1
-    if (denoiser := shot.settings.denoiser) != "none":
-        # Virtual images do not lie in the planes that their depths and normals describe.
-        guide = replace(virtual, depth=np.zeros_like(virtual.depth))
-        is_within = (virtual.shape_index & WITHIN) > 0
-        for layer, shading in enumerate(estimate.shadings):
-            variance = np.float32(NOISE_SHARE) * shading.variance
-            light, is_shown = Shading(shading.color, variance).to_image(is_traced), is_traced.copy()
-            if layer == 0:  # what the prepass images show is black among these; they have all light
-                is_shown.flat[known_pixels] = True
-                light.color.reshape(-1, 3)[known_pixels] = known_irradiance
-            for part in (is_within, ~is_within):  # apart, since the denoiser would mix them
-                pixels_of = is_traced & part
-                if pixels_of.any():
-                    own = Shading(light.color * part[..., None], light.variance * part)
-                    found = denoise_light(guide, own, is_shown & part, quality=denoiser, outlier=OUTLIER)
-                    layers[layer][part[is_traced]] = found[pixels_of]
-        times = DENOISED_SAMPLES
+    def estimated(irradiance: Callable[..., Samples], spp: int) -> Estimate:
+        def radiance(rays: Rays, sampler: Any) -> Samples:
+            path = seen_along(rays, sampler)
+            # Entries of the hash grid have the light of paths after one bounce.
+            path = replace(path, depth=dr.opaque(UInt, 1, dr.width(path.lane)))
+            return irradiance(cache, path, dr.width(sampler.seed))
+
+        random, layers = shot.walk.random(frame, Purpose.VIRTUAL_IMAGES), shot.integrator.irradiance_layers
+        estimate = shot.estimate(camera, is_traced, radiance, random, layers=layers)
+        estimate.add(spp)
+        return estimate
+
+    traced = estimated(shot.integrator.path_traced, SPP)
+
+    # Denoise what is gathered, and correct it by what is path traced; a denoised pixel is as reliable as many
+    # samples.
+    layers, times, count = [shading.color for shading in traced.shadings], 1, traced.count
+    if shot.settings.denoiser != "none":
+        gathered = estimated(shot.integrator.gathered, GATHER_SPP)
+        in_prepass = np.zeros((*is_traced.shape, 3), np.float32), np.zeros_like(is_traced)
+        in_prepass[0].reshape(-1, 3)[known_pixels] = known_irradiance
+        in_prepass[1].flat[known_pixels] = True
+        for layer, estimates in enumerate(zip(gathered.shadings, traced.shadings, strict=True)):
+            shown = in_prepass if layer == 0 else None  # it has all light
+            layers[layer] = _corrected(virtual, *estimates, is_traced, shown, shot.settings.denoiser)
+        times, count = DENOISED_SAMPLES, count + gathered.count
     irradiance = np.hstack(layers)
 
     # Fill entries of all sizes that are looked up: the smallest are as wide as one or two pixels, so that the
@@ -113,4 +112,57 @@ def _trace(shot: ShotContext, frame: int, virtual: Geometry, choice: float) -> t
         Entries.of(keys[level : level + LEVELS + 1], irradiance, unit=shot.unit).weighted(times / 4.0**level)
         for level in range(LEVELS)
     ]
-    return Entries.joined(sizes), estimate.count
+    return Entries.joined(sizes), count
+
+
+def _corrected(
+    virtual: Geometry,
+    gathered: Shading,
+    traced: Shading,
+    where: Mask,
+    in_prepass: tuple[F32, Mask] | None,
+    quality: str,
+) -> F32:
+    """Denoise what is gathered, and correct it by what is path traced.
+
+    Parameters
+    ----------
+    virtual
+        G-buffer with the virtual image.
+    gathered, traced
+        Estimates of the pixels of `where`, row by row.
+    where : (H, W) bool
+    in_prepass
+        Light, (H, W, 3), that the prepass images show between these pixels, and where, (H, W); it would be
+        black.
+    quality
+        Of the denoiser.
+
+    Returns
+    -------
+    (N, 3) float32
+        Of the pixels of `where`, row by row.
+    """
+    seen, light, is_shown = gathered.to_image(where).color, traced.to_image(where), where
+    if in_prepass:
+        known, is_known = in_prepass
+        is_shown = where | is_known
+        for image in (seen, light.color):
+            image[is_known] = known[is_known]
+    # Virtual images do not lie in the planes that their depths and normals describe.
+    guide = replace(virtual, depth=np.zeros_like(virtual.depth))
+    is_within = (virtual.shape_index & WITHIN) > 0
+    corrected = np.zeros_like(seen)
+    for part in (is_within, ~is_within):  # apart, since the denoiser would mix them
+        if (where & part).any():
+            own = Shading(light.color * part[..., None], light.variance * part)
+            found = denoise_light(
+                guide,
+                own,
+                is_shown & part,
+                quality=quality,
+                outlier=OUTLIER,
+                seen=seen * part[..., None],
+            )
+            corrected[part] = found[part]
+    return corrected[where]
