@@ -41,6 +41,8 @@ class Purpose(IntEnum):
     SEEN_HASH_GRID = 17
     GUIDING = 18
     DEPTHS = 19
+    GATHERED_VIRTUAL_IMAGES = 20
+    VIRTUAL_HASH_GRID = 21
 
 
 @dataclass(frozen=True)

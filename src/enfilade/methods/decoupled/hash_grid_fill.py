@@ -42,7 +42,7 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
         parts.append(Entries.of(levels, irradiance, unit=shot.unit))
 
     # Follow specular lobes; those of mirrors and panes have a pass of their own.
-    count = follow_specular(shot, frame, ~forms_image(geometry), cache, collect)
+    count = follow_specular(shot, frame, ~forms_image(geometry), cache, collect, Purpose.HASH_GRID)
 
     # See what prepass images don't show: surfaces that are clear for the most part, and thin ones.
     seen = shot.estimate(
@@ -86,7 +86,8 @@ def fill_from_images(shot: ShotContext, frame: int) -> Output:
         parts.append(Entries.of(levels, irradiance, unit=shot.unit))
 
     # Follow their specular lobes.
-    count = follow_specular(shot, frame, forms_image(shot.images.light_geometry(frame)), prepass, collect)
+    where = forms_image(shot.images.light_geometry(frame))
+    count = follow_specular(shot, frame, where, prepass, collect, Purpose.VIRTUAL_HASH_GRID)
     single = Entries.joined(parts)
 
     # Estimate what they show together; the noisier estimates of single paths are not added there.
@@ -103,7 +104,7 @@ def forms_image(geometry: Geometry) -> Mask:
 
 
 def follow_specular(
-    shot: ShotContext, frame: int, where: Mask, cache: IrradianceCache, collect: OnMiss
+    shot: ShotContext, frame: int, where: Mask, cache: IrradianceCache, collect: OnMiss, purpose: Purpose
 ) -> RayCount:
     """Follow specular lobes from pixels of a keyframe to what the cache misses."""
     estimate = shot.estimate(
@@ -112,7 +113,7 @@ def follow_specular(
         lambda rays, sampler: shot.integrator.specular_radiance(
             cache, shot.spawn(frame, rays, sampler), collect
         ),
-        shot.walk.random(frame, Purpose.HASH_GRID),
+        shot.walk.random(frame, purpose),
         pixel_filter=PixelFilter.BOX,
         layers=SPECULAR_AOVS,
     )

@@ -76,25 +76,25 @@ def _estimate(
     is_traced = np.zeros(virtual.shape_index.shape, np.bool_)
     is_traced.flat[pixels] = True
 
-    def estimated(irradiance: Callable[..., Samples], spp: int) -> Estimate:
+    def estimated(irradiance: Callable[..., Samples], spp: int, purpose: Purpose) -> Estimate:
         def radiance(rays: Rays, sampler: Any) -> Samples:
             path = seen_along(rays, sampler)
             # Entries of the hash grid have the light of paths after one bounce.
             path = replace(path, depth=dr.opaque(UInt, 1, dr.width(path.lane)))
             return irradiance(cache, path, dr.width(sampler.seed))
 
-        random, layers = shot.walk.random(frame, Purpose.VIRTUAL_IMAGES), shot.integrator.irradiance_layers
+        random, layers = shot.walk.random(frame, purpose), shot.integrator.irradiance_layers
         estimate = shot.estimate(camera, is_traced, radiance, random, layers=layers)
         estimate.add(spp)
         return estimate
 
-    traced = estimated(shot.integrator.path_traced, SPP)
+    traced = estimated(shot.integrator.path_traced, SPP, Purpose.VIRTUAL_IMAGES)
 
     # Denoise what is gathered, and correct it by what is path traced; a denoised pixel is as reliable as many
     # samples.
     layers, times, count = [shading.color for shading in traced.shadings], 1, traced.count
     if shot.settings.denoiser != "none":
-        gathered = estimated(shot.integrator.gathered, GATHER_SPP)
+        gathered = estimated(shot.integrator.gathered, GATHER_SPP, Purpose.GATHERED_VIRTUAL_IMAGES)
         in_prepass = np.zeros((*is_traced.shape, 3), np.float32), np.zeros_like(is_traced)
         in_prepass[0].reshape(-1, 3)[known_pixels] = known_irradiance
         in_prepass[1].flat[known_pixels] = True
