@@ -76,7 +76,7 @@ def denoise_light(
     is_excess_kept: bool = False,
     is_mirrored: bool = True,
     clamped: Mask | None = None,
-    seen: F32 | None = None,
+    denoised: F32 | None = None,
 ) -> F32:
     """Denoise light with normals as guides, and keep its mean along surfaces.
 
@@ -112,8 +112,9 @@ def denoise_light(
         Pixels, (H, W), whose fireflies are clamped for the denoiser, which would keep them on narrow
         surfaces; but not those with fewer than two neighbours that have light. The correction adds their
         light, up to `outlier`.
-    seen
-        (H, W, 3): what the denoiser sees in place of the estimates, with less noise, and perhaps a bias.
+    denoised
+        (H, W, 3): denoised light of another estimate, with less noise, and perhaps a bias. It is corrected in
+        place of what the denoiser makes of this one.
 
     Returns
     -------
@@ -122,14 +123,17 @@ def denoise_light(
     """
     # Denoise, light below zero apart.
     most = np.float32(outlier)
-    seen = light.color if seen is None else seen
-    positive = np.maximum(seen, np.float32(0))
-    negative = positive - seen
-    clean_input = positive if clamped is None else _without_fireflies(positive, clamped)
-    above = _denoised(clean_input, geometry, where, quality, is_mirrored=is_mirrored)
-    is_counted = _in_blocks(negative.sum(axis=2)) > NEGLIGIBLE * _in_blocks(positive.sum(axis=2))
-    negative[~_of_pixels(is_counted, where.shape)] = 0.0
-    below = _denoised(negative, geometry, where, quality, is_mirrored=is_mirrored)
+    if denoised is None:
+        positive = np.maximum(light.color, np.float32(0))
+        seen = positive if clamped is None else _without_fireflies(positive, clamped)
+        above = _denoised(seen, geometry, where, quality, is_mirrored=is_mirrored)
+        negative = positive - light.color
+        is_counted = _in_blocks(negative.sum(axis=2)) > NEGLIGIBLE * _in_blocks(positive.sum(axis=2))
+        negative[~_of_pixels(is_counted, where.shape)] = 0.0
+        below = _denoised(negative, geometry, where, quality, is_mirrored=is_mirrored)
+    else:
+        above = np.maximum(denoised, np.float32(0))
+        below = above - denoised
 
     # Smooth the difference, and the luminance.
     clean = above - below

@@ -29,6 +29,7 @@ from enfilade.renderer import Purpose, Rays
 
 SPP = 16  # paths of a pixel (bathroom, staircase2)
 GATHER_SPP = 8  # gather rays of a pixel
+UNLIMITED = 1e6  # times what is gathered: limited paths would have a bias of their own
 DENOISED_SAMPLES = 16  # estimates as which a denoised pixel counts
 
 
@@ -143,26 +144,23 @@ def _corrected(
     (N, 3) float32
         Of the pixels of `where`, row by row.
     """
-    seen, light, is_shown = gathered.to_image(where).color, traced.to_image(where), where
+    images, is_shown = [gathered.to_image(where), traced.to_image(where)], where
     if in_prepass:
         known, is_known = in_prepass
         is_shown = where | is_known
-        for image in (seen, light.color):
-            image[is_known] = known[is_known]
+        for image in images:
+            image.color[is_known] = known[is_known]
     # Virtual images do not lie in the planes that their depths and normals describe.
     guide = replace(virtual, depth=np.zeros_like(virtual.depth))
     is_within = (virtual.shape_index & WITHIN) > 0
-    corrected = np.zeros_like(seen)
+    corrected = np.zeros_like(images[0].color)
     for part in (is_within, ~is_within):  # apart, since the denoiser would mix them
         if (where & part).any():
-            own = Shading(light.color * part[..., None], light.variance * part)
-            found = denoise_light(
-                guide,
-                own,
-                is_shown & part,
-                quality=quality,
-                outlier=OUTLIER,
-                seen=seen * part[..., None],
-            )
+            # Keep all of the light that is gathered, and of the difference what exceeds its noise.
+            few, many = (Shading(of.color * part[..., None], of.variance * part) for of in images)
+            few = replace(few, variance=np.zeros_like(few.variance))
+            shown = is_shown & part
+            clean = denoise_light(guide, few, shown, quality=quality, outlier=OUTLIER, is_excess_kept=True)
+            found = denoise_light(guide, many, shown, quality=quality, outlier=UNLIMITED, denoised=clean)
             corrected[part] = found[part]
     return corrected[where]
