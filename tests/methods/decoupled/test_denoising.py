@@ -8,7 +8,7 @@ import pytest
 
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.methods.decoupled import denoising
-from enfilade.methods.decoupled.denoising import denoise_light
+from enfilade.methods.decoupled.denoising import correct_light, denoise_light
 from enfilade.methods.decoupled.edges import dilated
 from enfilade.methods.denoise import denoise
 from enfilade.records import Shading
@@ -237,6 +237,6 @@ def test_averages_over_pixels_keep_less_light_at_a_boundary():
 @pytest.mark.parametrize("bias", [0.5, 1.2])
 def test_another_estimate_lends_its_lack_of_noise_and_not_its_bias(bias):
     light = noisy(20)
-    alone, found = denoised(light), denoised(light, denoised=np.full_like(light.color, bias))
+    alone, found = denoised(light), correct_light(GEOMETRY, np.full_like(light.color, bias), light, WHERE)
     assert found.mean() == pytest.approx(light.color.mean(), rel=0.01)
     assert found.std() < 0.85 * alone.std()

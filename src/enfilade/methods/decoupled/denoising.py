@@ -76,7 +76,6 @@ def denoise_light(
     is_excess_kept: bool = False,
     is_mirrored: bool = True,
     clamped: Mask | None = None,
-    denoised: F32 | None = None,
 ) -> F32:
     """Denoise light with normals as guides, and keep its mean along surfaces.
 
@@ -112,9 +111,6 @@ def denoise_light(
         Pixels, (H, W), whose fireflies are clamped for the denoiser, which would keep them on narrow
         surfaces; but not those with fewer than two neighbours that have light. The correction adds their
         light, up to `outlier`.
-    denoised
-        (H, W, 3): denoised light of another estimate, with less noise, and perhaps a bias. It is corrected in
-        place of what the denoiser makes of this one.
 
     Returns
     -------
@@ -123,44 +119,80 @@ def denoise_light(
     """
     # Denoise, light below zero apart.
     most = np.float32(outlier)
-    if denoised is None:
-        positive = np.maximum(light.color, np.float32(0))
-        seen = positive if clamped is None else _without_fireflies(positive, clamped)
-        above = _denoised(seen, geometry, where, quality, is_mirrored=is_mirrored)
-        negative = positive - light.color
-        is_counted = _in_blocks(negative.sum(axis=2)) > NEGLIGIBLE * _in_blocks(positive.sum(axis=2))
-        negative[~_of_pixels(is_counted, where.shape)] = 0.0
-        below = _denoised(negative, geometry, where, quality, is_mirrored=is_mirrored)
-    else:
-        above = np.maximum(denoised, np.float32(0))
-        below = above - denoised
+    positive = np.maximum(light.color, np.float32(0))
+    seen = positive if clamped is None else _without_fireflies(positive, clamped)
+    above = _denoised(seen, geometry, where, quality, is_mirrored=is_mirrored)
+    negative = positive - light.color
+    is_counted = _in_blocks(negative.sum(axis=2)) > NEGLIGIBLE * _in_blocks(positive.sum(axis=2))
+    negative[~_of_pixels(is_counted, where.shape)] = 0.0
+    below = _denoised(negative, geometry, where, quality, is_mirrored=is_mirrored)
 
-    # Smooth the difference, and the luminance.
-    clean = above - below
-    limited = np.clip(light.color, -most * (above + below), most * above)
-    guide = guide_of(geometry, where)
-    weights = Array3f(*REC709_LUMINANCE)
-    own = lanes(luminance(above + below))
+    # Correct it by the difference from the input.
+    guide, clean, magnitude = guide_of(geometry, where), above - below, above + below
+    limited = np.clip(light.color, -most * magnitude, most * above)
+    corrected = clean + _correction(Shading(limited - clean, light.variance), magnitude, guide)
+    bounded: F32 = np.maximum(np.where(where[..., None], corrected, np.float32(0)), -most * below)
+    if is_excess_kept:
+        excess = np.where(where[..., None], light.color - limited, np.float32(0))
+        if excess.any():
+            bounded = _with_excess(bounded, excess, magnitude, guide)
+    return bounded
+
+
+def correct_light(geometry: Geometry, clean: F32, light: Shading, where: Mask) -> F32:
+    """Correct light by noisier estimates without bias, along surfaces, as far as these are certain.
+
+    Parameters
+    ----------
+    geometry
+        G-buffer.
+    clean : (H, W, 3) float32
+        With little noise, and perhaps a bias.
+    light
+        Estimates of shape (H, W), with the variance of their mean luminance. None is limited: their mean
+        would have a bias of its own.
+    where : (H, W) bool
+        Pixels that were sampled.
+
+    Returns
+    -------
+    (H, W, 3) float32
+        Not below zero where `clean` is not; 0 where no pixels were sampled.
+    """
+    difference = Shading(light.color - clean, light.variance)
+    corrected = clean + _correction(difference, np.abs(clean), guide_of(geometry, where))
+    bounded = np.where(clean < 0.0, corrected, np.maximum(corrected, np.float32(0)))
+    return np.where(where[..., None], bounded, np.float32(0))
+
+
+def _correction(difference: Shading, magnitude: F32, guide: Guide) -> F32:
+    """A difference, smoothed along surfaces, as far as it is significant, in proportion to the luminance.
+
+    Parameters
+    ----------
+    difference
+        Of shape (H, W), with the variance of its mean luminance.
+    magnitude : (H, W, 3) float32
+        Of the light to which it is added, 0 or more.
+    guide
+        Of the wavelet filter.
+
+    Returns
+    -------
+    (H, W, 3) float32
+    """
+    own = lanes(luminance(magnitude))
     smoothed, variance = smooth(
-        Array4f(*lanes(limited - clean), own),
-        lanes(light.variance),
+        Array4f(*lanes(difference.color), own),
+        lanes(difference.variance),
         guide,
         levels=LEVELS,
         deviations=None,
     )
-
-    # Add it as far as it is significant, in proportion to the luminance.
-    difference = smoothed.xyz
-    squared = dr.square(dr.dot(difference, weights))
+    squared = dr.square(dr.dot(smoothed.xyz, Array3f(*REC709_LUMINANCE)))
     share = own / dr.maximum(smoothed.w, 1e-20)
-    correction = difference * share * squared / dr.maximum(squared + variance, 1e-20)
-    corrected = np.where(where[..., None], clean + image(correction, *where.shape), np.float32(0))
-    bounded: F32 = np.maximum(corrected, -most * below)
-    if is_excess_kept:
-        excess = np.where(where[..., None], light.color - limited, np.float32(0))
-        if excess.any():
-            bounded = _with_excess(bounded, excess, above + below, guide)
-    return bounded
+    correction = smoothed.xyz * share * squared / dr.maximum(squared + variance, 1e-20)
+    return image(correction, *difference.variance.shape)
 
 
 def _with_excess(color: F32, excess: F32, weight: F32, guide: Guide) -> F32:

@@ -35,14 +35,11 @@ def gather_spp(pixels: int) -> int:
 def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
     """Estimate irradiance where paths from a keyframe end on surfaces that no prepass image shows."""
     parts: list[Entries] = []
-    cache, walk = shot.prepass_cache(frame), shot.walk
+    cache, walk, collect = shot.prepass_cache(frame), shot.walk, _collector(shot, parts)
     camera, geometry = light_camera(walk.path.cameras[frame]), shot.images.light_geometry(frame)
 
-    def collect(levels: list[npt.NDArray[np.uint64]], irradiance: F32) -> None:
-        parts.append(Entries.of(levels, irradiance, unit=shot.unit))
-
     # Follow specular lobes; those of mirrors and panes have a pass of their own.
-    count = follow_specular(shot, frame, ~forms_image(geometry), cache, collect, Purpose.HASH_GRID)
+    count = _follow_specular(shot, frame, ~_forms_image(geometry), cache, collect, Purpose.HASH_GRID)
 
     # See what prepass images don't show: surfaces that are clear for the most part, and thin ones.
     seen = shot.estimate(
@@ -78,16 +75,13 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
 def fill_from_images(shot: ShotContext, frame: int) -> Output:
     """Estimate irradiance where mirrors and panes of a keyframe show surfaces that no prepass image shows."""
     parts: list[Entries] = []
-    if not forms_image(shot.images.virtual_geometry(frame)).any():
+    if not _forms_image(shot.images.virtual_geometry(frame)).any():
         return Output({frame: Entries.joined(parts)}, {"rays": {"virtual_images": 0}, "dropped": 0})
-    prepass = shot.prepass_cache(frame)
-
-    def collect(levels: list[npt.NDArray[np.uint64]], irradiance: F32) -> None:
-        parts.append(Entries.of(levels, irradiance, unit=shot.unit))
+    prepass, collect = shot.prepass_cache(frame), _collector(shot, parts)
 
     # Follow their specular lobes.
-    where = forms_image(shot.images.light_geometry(frame))
-    count = follow_specular(shot, frame, where, prepass, collect, Purpose.VIRTUAL_HASH_GRID)
+    where = _forms_image(shot.images.light_geometry(frame))
+    count = _follow_specular(shot, frame, where, prepass, collect, Purpose.VIRTUAL_HASH_GRID)
     single = Entries.joined(parts)
 
     # Estimate what they show together; the noisier estimates of single paths are not added there.
@@ -98,12 +92,21 @@ def fill_from_images(shot: ShotContext, frame: int) -> Output:
     return Output({frame: entries}, {"rays": {"virtual_images": count.rays}, "dropped": count.dropped})
 
 
-def forms_image(geometry: Geometry) -> Mask:
+def _collector(shot: ShotContext, parts: list[Entries]) -> OnMiss:
+    """A function that appends estimates as entries to a list."""
+
+    def collect(levels: list[npt.NDArray[np.uint64]], irradiance: F32) -> None:
+        parts.append(Entries.of(levels, irradiance, unit=shot.unit))
+
+    return collect
+
+
+def _forms_image(geometry: Geometry) -> Mask:
     """Pixels of mirrors and panes; (H, W) bool."""
     return np.isin(geometry.surface, IMAGING)
 
 
-def follow_specular(
+def _follow_specular(
     shot: ShotContext, frame: int, where: Mask, cache: IrradianceCache, collect: OnMiss, purpose: Purpose
 ) -> RayCount:
     """Follow specular lobes from pixels of a keyframe to what the cache misses."""

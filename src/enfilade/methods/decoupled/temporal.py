@@ -74,7 +74,7 @@ class TemporalAccumulation:
                 neighbours = [(of[k], weights[f]) for f, of in aovs.items() if k < len(of)]
                 color = color + accumulate_temporally(geometry, here, neighbours, unit=unit)
 
-        # Average refined pixels.
+        # Average refined pixels; those below zero are filled before.
         color = without_negative(color, geometry.shape_index)
         if shaded.deviation.any():
             displayed = {f: self._displayed_image(shot, f) for f in frames}

@@ -17,7 +17,7 @@ from enfilade.arrays import UInt, lanes, rows
 from enfilade.kernels.estimate import Estimate, RayCount, Samples
 from enfilade.kernels.random import one_sequence
 from enfilade.kernels.rays import camera_rays, pixel_centres
-from enfilade.methods.decoupled.denoising import OUTLIER, denoise_light
+from enfilade.methods.decoupled.denoising import OUTLIER, correct_light, denoise_light
 from enfilade.methods.decoupled.hash_grid import LEVELS
 from enfilade.methods.decoupled.hash_grid_entries import Entries
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
@@ -29,7 +29,6 @@ from enfilade.renderer import Purpose, Rays
 
 SPP = 16  # paths of a pixel (bathroom, staircase2)
 GATHER_SPP = 8  # gather rays of a pixel
-UNLIMITED = 1e6  # times what is gathered: limited paths would have a bias of their own
 DENOISED_SAMPLES = 16  # estimates as which a denoised pixel counts
 
 
@@ -52,7 +51,7 @@ def _estimate(
     shot: ShotContext, frame: int, cache: IrradianceCache, virtual: Geometry, choice: float
 ) -> tuple[Entries, RayCount]:
     """Entries of a virtual image, and the number of rays."""
-    prepass, camera = shot.prepass_cache(frame), virtual.camera
+    camera = virtual.camera
 
     def seen_along(rays: Rays, sampler: Any) -> Path:
         return shot.virtual_images.seen_along(shot.spawn(frame, rays, sampler), choice)
@@ -64,7 +63,7 @@ def _estimate(
     path = seen_along(camera_rays(camera, pixel_centres(camera, lanes(pixels))), one_sequence(len(pixels)))
     if not dr.width(path.lane):
         return Entries.joined([]), RayCount()
-    keys, cached, is_known, is_missing = shot.integrator.kernels.find_entries(prepass, path)
+    keys, cached, is_known, is_missing = shot.integrator.kernels.find_entries(cache, path)
     chosen, lane = np.flatnonzero(np.array(is_missing)), np.array(path.lane)
     if not len(chosen):
         return Entries.joined([]), RayCount()
@@ -144,23 +143,21 @@ def _corrected(
     (N, 3) float32
         Of the pixels of `where`, row by row.
     """
-    images, is_shown = [gathered.to_image(where), traced.to_image(where)], where
+    few, many, is_shown = gathered.to_image(where), traced.to_image(where), where
     if in_prepass:
         known, is_known = in_prepass
         is_shown = where | is_known
-        for image in images:
+        for image in (few, many):
             image.color[is_known] = known[is_known]
+    few = replace(few, variance=np.zeros_like(few.variance))  # so that all light that is gathered is kept
     # Virtual images do not lie in the planes that their depths and normals describe.
     guide = replace(virtual, depth=np.zeros_like(virtual.depth))
     is_within = (virtual.shape_index & WITHIN) > 0
-    corrected = np.zeros_like(images[0].color)
+    corrected = np.zeros_like(few.color)
     for part in (is_within, ~is_within):  # apart, since the denoiser would mix them
         if (where & part).any():
-            # Keep all of the light that is gathered, and of the difference what exceeds its noise.
-            few, many = (Shading(of.color * part[..., None], of.variance * part) for of in images)
-            few = replace(few, variance=np.zeros_like(few.variance))
             shown = is_shown & part
-            clean = denoise_light(guide, few, shown, quality=quality, outlier=OUTLIER, is_excess_kept=True)
-            found = denoise_light(guide, many, shown, quality=quality, outlier=UNLIMITED, denoised=clean)
-            corrected[part] = found[part]
+            own = replace(few, color=few.color * part[..., None])
+            clean = denoise_light(guide, own, shown, quality=quality, outlier=OUTLIER, is_excess_kept=True)
+            corrected[part] = correct_light(guide, clean, many, shown)[part]
     return corrected[where]
