@@ -1,4 +1,4 @@
-"""Numbers of paths of irradiance images."""
+"""Irradiance images: numbers of paths, and disocclusions."""
 
 from dataclasses import replace
 
@@ -7,6 +7,7 @@ import pytest
 
 from enfilade.camera.path import CameraPath
 from enfilade.camera.pinhole import Camera, look_at
+from enfilade.kernels.tone import luminance
 from enfilade.methods.decoupled import Decoupled, irradiance
 from enfilade.methods.decoupled.light_camera import irradiance_camera
 from enfilade.methods.decoupled.surface_edges import narrow_surfaces, surface_edges
@@ -42,3 +43,26 @@ def test_narrow_surfaces_have_more_paths(tmp_path, monkeypatch):
     np.testing.assert_array_equal(found.indirect.color[~narrow], plain.indirect.color[~narrow])
     noise, plain_noise = (image.indirect.variance[narrow].mean() for image in (found, plain))
     assert noise < 0.35 * plain_noise
+
+
+def test_what_comes_into_view_between_two_keyframes_has_no_more_grain_than_keyframes(tmp_path):
+    # Between two keyframes that look at the middle of a wall, a frame looks up.
+    shapes = (
+        placed("rectangle", "wall", (0, 0, -2), DIFFUSE, 6),
+        placed("cube", "floor", (0, -8, 0), DIFFUSE, 6),
+    )
+    cameras = tuple(Camera(look_at((0, 0, 4), (0, y, -2)), 40, *SIZE) for y in (0.0, 1.5, 0.0))
+    path = CameraPath(cameras, (1, 2, 3), 24.0)
+    settings = {"decoupled": {"irradiance_spp": 8}, "keyframes": {"placement": "uniform", "spacing": 2}}
+    results = run_passes(Decoupled(), walk_of(path, opened(write(tmp_path, *shapes)), **settings))
+    strip, keyframe = results.record("disocclusion", 1), results.record("irradiance", 0)
+
+    assert 0.1 < strip.is_known.mean() < 0.4
+    assert grain(strip) < 1.5 * grain(keyframe)
+
+
+def grain(image):
+    """Mean difference of neighbours in a row, relative to their indirect light."""
+    light = luminance(image.indirect.color)
+    both = image.is_known[:, 1:] & image.is_known[:, :-1]
+    return np.abs(np.diff(light, axis=1))[both].mean() / light[image.is_known].mean()

@@ -20,8 +20,8 @@ NARROW_PATHS = 4  # times the paths of a pixel, on narrow surfaces: a denoiser l
 MIN_DISOCCLUSION = 5e-3  # of a frame's pixels: fewer have no image, and are estimated in each frame
 
 
-def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage, Mask, RayCount]:
-    """Gather the irradiance of some pixels of an irradiance image, at their centres.
+def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage, RayCount]:
+    """Gather the irradiance of some pixels of an irradiance image, at their centres, and denoise it.
 
     Narrow surfaces, such as bevels, have more paths.
 
@@ -34,11 +34,10 @@ def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage
     Returns
     -------
     image : IrradianceImage
-        Its variance is that of its paths, times :data:`NOISE_SHARE`.
-    narrow : (H, W) bool
-        Its narrow surfaces.
+        Without a denoiser, its variance is that of its paths, times :data:`NOISE_SHARE`.
     count : RayCount
     """
+    geometry = shot.images.irradiance_geometry(frame)
     walk, cache = shot.walk, shot.final_gather_cache(frame)
     estimate = shot.estimate(
         irradiance_camera(walk.path.cameras[frame]),
@@ -47,27 +46,26 @@ def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage
         walk.random(frame, Purpose.IRRADIANCE),
     )
     spp = irradiance_spp(shot.settings, len(shot.keyframes))
-    is_edge, _ = surface_edges(shot.images.irradiance_geometry(frame))
+    is_edge, _ = surface_edges(geometry)
     estimate.add(spp)
     narrow = narrow_surfaces(is_edge, where)
     estimate.add((NARROW_PATHS - 1) * spp, narrow[where])
     direct, indirect = (shading.to_image(where) for shading in estimate.shadings)
-    return IrradianceImage(direct, indirect, where).with_noise(NOISE_SHARE), narrow, estimate.count
+    image = IrradianceImage(direct, indirect, where).with_noise(NOISE_SHARE)
+    if shot.settings.denoiser != "none":
+        image = denoise_irradiance(geometry, image, shot.settings.denoiser, narrow=narrow)
+    return image, estimate.count
 
 
 def gather_keyframe(shot: ShotContext, frame: int) -> Output:
-    """The irradiance image of a keyframe, denoised."""
-    geometry = shot.images.irradiance_geometry(frame)
-    image, narrow, count = _gather(shot, frame, geometry.has_diffuse)
-    if shot.settings.denoiser != "none":
-        image = denoise_irradiance(geometry, image, shot.settings.denoiser, narrow=narrow)
+    """The irradiance image of a keyframe."""
+    image, count = _gather(shot, frame, shot.images.irradiance_geometry(frame).has_diffuse)
     return Output({frame: image}, {"rays": {"irradiance": count.rays}, "dropped": count.dropped})
 
 
 def fill_disocclusions(shot: ShotContext, segment: Segment) -> Output:
     """Disocclusion images: irradiance of surfaces between two keyframes that no keyframe shows.
 
-    These images are too sparse for a denoiser: the wavelet filter smooths them.
     The segment is halved until no further surface comes into view. An image contains all surfaces of its
     frame that the keyframes do not show, so that other frames find them in the images before and after.
     """
@@ -87,7 +85,7 @@ def fill_disocclusions(shot: ShotContext, segment: Segment) -> Output:
             continue
 
         # Gather the surfaces that no keyframe shows, and go on with both halves.
-        image, _, own = _gather(shot, middle, shot.uncovered(middle, {}))
+        image, own = _gather(shot, middle, shot.uncovered(middle, {}))
         images[middle], uploaded[middle] = image, upload(shot.images.irradiance_geometry(middle), image)
         count += own
         pending += [(middle, last), (first, middle)]
