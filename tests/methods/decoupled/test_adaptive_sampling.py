@@ -10,6 +10,7 @@ from enfilade.methods.decoupled.adaptive_sampling import (
     AdaptiveSampling,
     displayed_deviation,
     displayed_tolerance,
+    variance_around,
 )
 from enfilade.methods.decoupled.edges import beside, dilated
 
@@ -24,7 +25,8 @@ class Means:
     def __init__(self, sampled, mean, variance):
         self._of = [np.asarray(of, np.float32)[sampled] for of in (mean, variance)]
 
-    def luminance(self, where):
+    def luminance(self, where=None):
+        where = np.ones(self._of[0].shape, bool) if where is None else where
         Means.evaluated += where.sum()
         return tuple(lanes(of[where]) for of in self._of)
 
@@ -134,6 +136,47 @@ def test_a_bright_surface_beside_a_pixel_may_have_been_missed(sky, spp, is_uncer
 def test_the_tolerance_follows_the_quality():
     tolerances = [displayed_tolerance(quality) for quality in (1.0, 4.0, 16.0, 64.0)]
     np.testing.assert_allclose(tolerances, [0.0033, 0.0066, 0.0132, 0.0264])
+
+
+@pytest.mark.parametrize(
+    ("mean", "variance", "is_faint"), [(0.02, 0.0, True), (0.3, 0.0, False), (0.02, 0.01, False)]
+)
+def test_faint_pixels_change_what_is_displayed_by_little(mean, variance, is_faint):
+    # The variance is that of a mean of two rays.
+    everywhere = np.ones((H, W), bool)
+    estimate = Means(everywhere, np.full((H, W), mean), np.full((H, W), variance))
+    sampling = AdaptiveSampling(128, 0.05, 0.0, beneath=np.full((H, W), 0.3, np.float32))
+    rms = np.sqrt(mean**2 + 2 * variance)
+    assert (deviations([0.3], [0.3 + rms])[0] < 0.05) == is_faint
+    assert (sampling.is_faint(estimate, everywhere, 2) == is_faint).all()
+
+
+def test_whether_a_pixel_is_faint_follows_from_those_around_it():
+    """A pixel that has found a rare bright path would be averaged with more rays than others."""
+    everywhere, mean = np.ones((H, W), bool), np.zeros((H, W))
+    mean[10, 12] = 20.0
+    found = AdaptiveSampling(128, 0.05, 0.0).is_faint(
+        Means(everywhere, mean, np.zeros((H, W))), everywhere, 1
+    )
+    around = dilated(mean > 0.0, 3) & (mean == 0.0)
+    np.testing.assert_array_equal(found, ~around)
+
+
+def test_pixels_with_few_others_around_are_not_faint():
+    sampled = np.zeros((H, W), bool)
+    sampled[2, :20] = sampled[10:13, 12:15] = True  # a line, of which six other pixels are near; a square
+    black = Means(sampled, np.zeros((H, W)), np.zeros((H, W)))
+    found = AdaptiveSampling(128, 0.05, 0.0).is_faint(black, sampled, 1)
+    assert not found[2].any()
+    assert found[10:13, 12:15].all()
+
+
+def test_the_variance_around_a_pixel_is_that_of_independent_noise():
+    noise = np.random.default_rng(3).normal(1.0, 0.1, (64, 64, 1)).astype(np.float32)
+    color, sampled = np.broadcast_to(noise, (64, 64, 3)).copy(), np.ones((64, 64), bool)
+    sampled[:, 40:] = False
+    color[~sampled] = 7.0
+    assert variance_around(color, sampled)[:, :40].mean() == pytest.approx(0.01, rel=0.1)
 
 
 def test_rays_double_where_the_value_is_uncertain_and_beside_it():

@@ -8,6 +8,8 @@ from typing import Any
 
 import drjit as dr
 import numpy as np
+import numpy.typing as npt
+import scipy.ndimage
 
 from enfilade.arrays import Float, Int, UInt, image, lanes, opaque
 from enfilade.kernels.estimate import Estimate
@@ -28,6 +30,9 @@ EDGE_SPP = 16  # rays of a pixel at an edge; their number doubles while its valu
 DISPLAYED_DEVIATION = 0.0033  # times the square root of the quality: above it a displayed value is uncertain
 SPECULAR_DEVIATION = 2.0  # times that: specular rays, which cost more than camera rays
 SPECULAR_CONTRAST = 1.0 / 3.0  # times that: specular AOVs are refined where half their contrast exceeds it
+FAINT = 1.5  # times that: specular AOVs are faint where half of their root mean square is below it
+AROUND = 7  # pixels: the window over which that is averaged
+MIN_AROUND = 8  # sampled pixels of the window
 
 
 @dataclass(frozen=True)
@@ -77,6 +82,29 @@ class AdaptiveSampling:
         pixel = dr.arange(UInt, shape[0] * shape[1])
         low, high = _extremes(lanes(luminance(color)), pixel, shape)
         return image(self._exceeds(low, high, pixel), *shape)
+
+    def is_faint(self, estimate: Estimate, sampled: Mask, spp: int) -> Mask:
+        """Pixels where the estimates, and their noise, are hardly seen, (H, W).
+
+        They are judged by the root mean square of single rays in the pixels around, not by their own rays:
+        the mean of a pixel has no bias if its number of rays does not depend on what they have found.
+
+        Parameters
+        ----------
+        estimate
+            Of the pixels of `sampled`, row by row.
+        sampled : (H, W) bool
+        spp
+            Rays of each pixel.
+        """
+        mean, variance = estimate.luminance()
+        squared, known = np.zeros(sampled.shape), sampled.astype(np.float64)
+        squared[sampled] = np.array(dr.square(mean) + spp * variance)
+        total, count = _sum_around(squared), _sum_around(known)
+        rms = np.sqrt(total / np.maximum(count, 1.0)).astype(np.float32)
+        exceeds = self._exceeds(Float(0), lanes(rms), dr.arange(UInt, sampled.size))
+        is_faint: Mask = sampled & (count + 0.5 > MIN_AROUND) & ~image(exceeds, *sampled.shape)
+        return is_faint
 
     def uncertain(
         self, estimate: Estimate, sampled: Mask, among: Mask | None = None, counts: U32 | None = None
@@ -180,6 +208,16 @@ class AdaptiveSampling:
             spp += more
 
 
+def variance_around(color: F32, sampled: Mask) -> F32:
+    """Variance of the luminance of an image, (H, W, 3), over the sampled pixels around each; (H, W)."""
+    known = sampled.astype(np.float64)
+    value = known * luminance(color)
+    count = np.maximum(_sum_around(known), 1.0)
+    variance = _sum_around(np.square(value)) / count - np.square(_sum_around(value) / count)
+    positive: F32 = np.maximum(variance, 0.0).astype(np.float32)
+    return positive
+
+
 def displayed_tolerance(quality: float) -> float:
     """Standard deviation of a displayed value, 0..1, above which its pixel has more camera rays."""
     return DISPLAYED_DEVIATION * math.sqrt(quality)
@@ -203,6 +241,13 @@ def _srgb_encode(linear: Any) -> Any:
     power = dr.power(dr.maximum(linear, SRGB_LINEAR_LIMIT), 1.0 / SRGB_GAMMA)
     curved = (1.0 + SRGB_OFFSET) * power - SRGB_OFFSET
     return dr.select(linear <= SRGB_LINEAR_LIMIT, SRGB_SLOPE * linear, curved)
+
+
+def _sum_around(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Sums over the pixels around each, without itself, (H, W)."""
+    mean = scipy.ndimage.uniform_filter(values, AROUND, mode="constant")
+    total: npt.NDArray[np.float64] = np.maximum(AROUND**2 * mean - values, 0.0)
+    return total
 
 
 def _extremes(values: Any, pixel: Any, shape: tuple[int, ...]) -> tuple[Any, Any]:

@@ -7,16 +7,18 @@ an edge meet the surface at its centre alone; then the filtered values are looke
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from enfilade.arrays import release_memory, to_float
 from enfilade.kernels.estimate import Confined, RayCount
 from enfilade.methods.decoupled.adaptive_sampling import (
+    FAINT,
     SPECULAR_CONTRAST,
     SPECULAR_DEVIATION,
     AdaptiveSampling,
+    variance_around,
 )
 from enfilade.methods.decoupled.edges import dilated, is_outline
 from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
@@ -29,8 +31,10 @@ from enfilade.methods.decoupled.specular_filter import filter_spatially, upload_
 from enfilade.methods.decoupled.specular_tint import find_tint
 from enfilade.methods.decoupled.surface_edges import narrow_surfaces, own_sides, surface_edges
 from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
-from enfilade.records import F32, Geometry, Mask
+from enfilade.records import F32, Geometry, Mask, Shading
 from enfilade.renderer import PixelFilter, Purpose
+
+FAINT_SHARE = 4  # faint pixels have one in so many of the rays
 
 
 def shade_specular(
@@ -86,15 +90,18 @@ def shade_specular(
         confined=confined,
     )
     spp = specular_spp(shot.settings, shot.frames)
-    estimate.add(spp)
+    few = max(spp // FAINT_SHARE, 1)
+    estimate.add(few)
+    is_faint = AdaptiveSampling.of(shot.walk, times=FAINT, beneath=beneath).is_faint(estimate, where, few)
+    estimate.add(spp - few, ~is_faint[where])
     sampling.reduce_noise(estimate, where, is_narrow, spp)
-    traced = [of.to_image(where) for of in estimate.shadings]
+    traced = [_with_variance(of.to_image(where), where, is_faint) for of in estimate.shadings]
     count = estimate.count
     del estimate  # its sums take 80 bytes a pixel
     release_memory()
 
     # Filter the AOVs along the surfaces that are seen in them, without the texture of metal.
-    tint = find_tint(shot, frame, where, confined, is_narrow, spp)
+    tint = find_tint(shot, frame, where, confined, is_narrow | is_faint, spp)
     if tint:
         traced[0] = tint.divided(traced[0])
         release_memory()
@@ -152,6 +159,12 @@ class SpecularShading:
     is_refined: Mask
     variance: F32
     count: RayCount
+
+
+def _with_variance(aov: Shading, sampled: Mask, is_faint: Mask) -> Shading:
+    """An AOV whose faint pixels, of a single ray perhaps, have the variance of those around."""
+    around = variance_around(aov.color, sampled)
+    return replace(aov, variance=np.where(is_faint, around, aov.variance))
 
 
 def _looked_up(
