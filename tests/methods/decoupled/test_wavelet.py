@@ -74,6 +74,19 @@ def test_smoothing_matches_loops(scene):
     np.testing.assert_allclose(variance, wanted_variance, rtol=2e-3)
 
 
+def test_pixels_without_a_shape_stay_as_they_are(scene):
+    scene.shape_index[4:9, 5:20] = 0
+    outside = scene.shape_index == 0
+    color, variance = scene.smoothed()
+    np.testing.assert_array_equal(color[outside], scene.color[outside])
+    np.testing.assert_array_equal(variance[outside], scene.variance[outside])
+    scene.color[outside] = 100.0
+    np.testing.assert_array_equal(scene.smoothed()[0][~outside], color[~outside])
+    assert (color[~outside] != scene.color[~outside]).any(axis=1).mean() > 0.95
+    scene.shape_index[:] = 0
+    np.testing.assert_array_equal(scene.smoothed()[0], scene.color)
+
+
 def wall(height, width):
     """A plain wall that fills the image."""
     normal = np.zeros((height, width, 3), np.float32)

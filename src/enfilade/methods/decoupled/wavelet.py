@@ -33,7 +33,7 @@ class Guide:
     depths : Float
     normals : Array3f
     shape_indices : UInt
-        Images, width * height lanes. Pixels of different shapes do not mix.
+        Images, width * height lanes. Pixels of different shapes do not mix; those of 0 stay as they are.
     direction_from_pixel : Matrix3f
         Of the camera.
     width, height : int
@@ -48,7 +48,7 @@ class Guide:
 
 
 def guide_of(geometry: Geometry, where: Mask) -> Guide:
-    """Guide of the wavelet filter; pixels of a mask, (H, W), mix with no others."""
+    """Guide of the wavelet filter, for the pixels of a mask, (H, W)."""
     return Guide(
         depths=lanes(geometry.depth),
         normals=lanes(geometry.normal),
@@ -66,7 +66,7 @@ def smooth_along(geometry: Geometry, where: Mask, color: Any, variance: Any) -> 
     ----------
     geometry
     where : (H, W) bool
-        Pixels that mix with no others.
+        Pixels that are smoothed; they mix with no others.
     color : Array3f
         Image, width * height lanes.
     variance : Float
@@ -109,36 +109,55 @@ def smooth(
     variance : Float
         Of the result.
     """
+    pixel: Any = dr.compress(guide.shape_indices > 0)
+    if not dr.width(pixel):
+        return color, variance
     related = Float(1)  # variance of the result over that of independent pixels
     for level in range(levels):
-        color, variance, fraction = _filter_level(color, variance, guide, opaque(1 << level, Int), deviations)
+        step = opaque(1 << level, Int)
+        *filtered, fraction = _filter_level(color, variance, guide, pixel, step, deviations)
         part = INDEPENDENT[level] if level < len(INDEPENDENT) else INDEPENDENT_BEYOND
         related *= fraction ** (part - 1.0)
+        if level == levels - 1:
+            filtered[1] *= related
+        color, variance = (
+            _replaced(of, pixel, own) for of, own in zip((color, variance), filtered, strict=True)
+        )
         dr.eval(color, variance, related)
-    return color, variance * related
+    return color, variance
 
 
 def _filter_level(
-    color: Any, variance: Any, guide: Guide, step: Any, deviations: float | None
+    colors: Any, variances: Any, guide: Guide, pixel: Any, step: Any, deviations: float | None
 ) -> tuple[Any, Any, Any]:
-    """One level: colour, variance as if pixels were independent, and the ratio of that to the one before."""
-    lane, column, row = pixel_grid(guide.height, guide.width)
+    """One level, at some pixels.
+
+    Returns
+    -------
+    color
+    variance : Float
+        As if pixels were independent.
+    fraction : Float
+        Ratio of the variance to the one before.
+    """
     width, height = opaque(guide.width, Int), opaque(guide.height, Int)
-    column, row = Int(column), Int(row)
 
     # Blur the variance.
-    blurred = _blurred(variance, column, row, width, height) if deviations else Float(0)
+    blurred = _blurred(variances, guide) if deviations else Float(0)
     dr.eval(blurred)
 
     # Prepare the distance of taps from this pixel's tangent plane.
-    normal = dr.gather(Array3f, guide.normals, lane)
-    depth = dr.gather(Float, guide.depths, lane)
-    shape_index = dr.gather(UInt, guide.shape_indices, lane)
+    row = Int(pixel) // width
+    column = Int(pixel) - row * width
+    vector = type(colors)
+    color, variance = dr.gather(vector, colors, pixel), dr.gather(Float, variances, pixel)
+    normal = dr.gather(Array3f, guide.normals, pixel)
+    depth = dr.gather(Float, guide.depths, pixel)
+    shape_index = dr.gather(UInt, guide.shape_indices, pixel)
     slope = guide.direction_from_pixel.T @ normal
     offset = depth * dr.dot(slope, Array3f(Float(column) + 0.5, Float(row) + 0.5, 1))
     nearness = dr.rcp(PLANE_TOLERANCE * depth + TINY)
 
-    vector = type(color)
     total, total_variance, squares = vector(0), Float(0), Float(0)
     weight, taken = Float(0), Float(0)
     for down, weight_y in zip(range(-2, 3), SPLINE, strict=True):
@@ -159,15 +178,16 @@ def _filter_level(
             surface = dr.select(is_same, surface * Float(weight_x * weight_y), 0.0)
 
             # Weight it by the difference of luminance in units of the noise of both pixels.
-            other, of_tap = dr.gather(vector, color, tap), surface
+            other, of_tap = dr.gather(vector, colors, tap), surface
             if deviations:
-                deviation = deviations * dr.sqrt(blurred + dr.gather(Float, blurred, tap)) + TINY
+                both = dr.gather(Float, blurred, pixel) + dr.gather(Float, blurred, tap)
+                deviation = deviations * dr.sqrt(both) + TINY
                 difference = dr.abs(dr.dot(other - color, Array3f(*REC709_LUMINANCE)))
                 of_tap = surface * dr.exp(-difference / deviation)
 
             # Accumulate.
             total += of_tap * other
-            total_variance += of_tap * of_tap * dr.gather(Float, variance, tap)
+            total_variance += of_tap * of_tap * dr.gather(Float, variances, tap)
             squares += of_tap * of_tap
             weight += surface
             taken += of_tap
@@ -244,8 +264,18 @@ def firefly_weights(color: Any, *, width: int, height: int, rank: int = 1) -> An
     return dr.select(luminance > limit, limit / dr.maximum(luminance, TINY), 1.0)
 
 
-def _blurred(variance: Any, column: Any, row: Any, width: Any, height: Any) -> Any:
+def _replaced(image: Any, pixel: Any, values: Any) -> Any:
+    """An image with other values at some pixels."""
+    replaced = type(image)(image)  # `scatter` copies what is shared
+    dr.scatter(replaced, values, pixel)
+    return replaced
+
+
+def _blurred(variance: Any, guide: Guide) -> Any:
     """Variance, blurred over 3x3 pixels to reduce its own noise."""
+    _, column, row = pixel_grid(guide.height, guide.width)
+    column, row = Int(column), Int(row)
+    width, height = opaque(guide.width, Int), opaque(guide.height, Int)
     blurred = Float(0)
     for down, weight_y in zip((-1, 0, 1), (0.25, 0.5, 0.25), strict=True):
         for across, weight_x in zip((-1, 0, 1), (0.25, 0.5, 0.25), strict=True):
