@@ -235,8 +235,10 @@ def test_averages_over_pixels_keep_less_light_at_a_boundary():
 
 
 @pytest.mark.parametrize("bias", [0.5, 1.2])
-def test_another_estimate_lends_its_lack_of_noise_and_not_its_bias(bias):
+@pytest.mark.parametrize("levels", [5, 6])
+def test_another_estimate_lends_its_lack_of_noise_and_not_its_bias(bias, levels):
     light = noisy(20)
-    alone, found = denoised(light), correct_light(GEOMETRY, np.full_like(light.color, bias), light, WHERE)
+    clean = np.full_like(light.color, bias)
+    alone, found = denoised(light), correct_light(GEOMETRY, clean, light, WHERE, levels=levels)
     assert found.mean() == pytest.approx(light.color.mean(), rel=0.01)
     assert found.std() < 0.85 * alone.std()

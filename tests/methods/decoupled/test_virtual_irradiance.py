@@ -10,7 +10,7 @@ from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry
 from enfilade.kernels.random import one_sequence
 from enfilade.kernels.rays import camera_rays, pixel_centres
-from enfilade.methods.decoupled import Decoupled
+from enfilade.methods.decoupled import Decoupled, light_camera
 from enfilade.methods.decoupled.integrator import Integrator
 from enfilade.methods.decoupled.paths import spawn
 from enfilade.methods.decoupled.shot import ShotContext
@@ -144,13 +144,7 @@ def test_lookups_between_the_centres_of_pixels_find_the_light_of_virtual_images(
         f'<scene version="3.0.0"><integrator type="path"/><emitter type="constant"/>{floor}{slab}</scene>'
     )
     renderer = MitsubaRenderer(file)
-    camera = Camera(look_at((0.0, 1.2, 3.0), (0.0, 0.6, 0.0)), 40, *SIZE)
-    walk = walk_of(CameraPath((camera,), (1,), 24.0), renderer)
-    method, results = Decoupled(), InMemory(walk)
-    task = next(iter(method.tasks(results.analysis)))  # of the prepass
-    output = method.run(task, results, walk)
-    results.records[task.id], results.task_metadata[task.id] = output.records[0], dict(output.metadata)
-    shot = ShotContext(0, [Segment(0, 0)], results, walk, Integrator(renderer), VirtualImages(renderer))
+    shot = after_prepass(renderer, Camera(look_at((0.0, 1.2, 3.0), (0.0, 0.6, 0.0)), 40, *SIZE))
     grid = estimate_virtual_images(shot, 0, shot.prepass_cache(0))[0].upload()
 
     virtual = shot.virtual_images.find(shot.images.virtual_geometry(0))[CHOICES.index(TRANSMIT)]
@@ -166,6 +160,28 @@ def test_lookups_between_the_centres_of_pixels_find_the_light_of_virtual_images(
     )
     assert np.count_nonzero(np.array(where)) > 2000
     assert np.array(is_found)[np.array(where)].mean() > 0.85
+
+
+def after_prepass(renderer: MitsubaRenderer, camera: Camera) -> ShotContext:
+    """A shot of one frame whose prepass is finished."""
+    walk = walk_of(CameraPath((camera,), (1,), 24.0), renderer)
+    method, results = Decoupled(), InMemory(walk)
+    task = next(iter(method.tasks(results.analysis)))  # of the prepass
+    output = method.run(task, results, walk)
+    results.records[task.id], results.task_metadata[task.id] = output.records[0], dict(output.metadata)
+    return ShotContext(0, [Segment(0, 0)], results, walk, Integrator(renderer), VirtualImages(renderer))
+
+
+def test_large_frames_have_a_quarter_of_the_paths_in_each_pixel_of_virtual_images(tmp_path, monkeypatch):
+    renderer = room(tmp_path, max_depth=-1)
+
+    def rays() -> int:
+        shot = after_prepass(renderer, CAMERAS[0])
+        return estimate_virtual_images(shot, 0, shot.prepass_cache(0))[1].rays
+
+    small = rays()
+    monkeypatch.setattr(light_camera, "LIGHT_PIXELS", SIZE[0] * SIZE[1] // 4)
+    assert rays() / small == pytest.approx((4 + 8) / (16 + 8), rel=0.01)
 
 
 @pytest.mark.slow

@@ -139,7 +139,9 @@ def denoise_light(
     return bounded
 
 
-def correct_light(geometry: Geometry, clean: F32, light: Shading, where: Mask) -> F32:
+def correct_light(
+    geometry: Geometry, clean: F32, light: Shading, where: Mask, *, levels: int = LEVELS
+) -> F32:
     """Correct light by noisier estimates without bias, along surfaces, as far as these are certain.
 
     Parameters
@@ -153,6 +155,8 @@ def correct_light(geometry: Geometry, clean: F32, light: Shading, where: Mask) -
         would have a bias of its own.
     where : (H, W) bool
         Pixels that were sampled.
+    levels
+        Of the wavelet that smooths the correction, over 2 ** levels pixels to each side.
 
     Returns
     -------
@@ -160,12 +164,12 @@ def correct_light(geometry: Geometry, clean: F32, light: Shading, where: Mask) -
         Not below zero where `clean` is not; 0 where no pixels were sampled.
     """
     difference = Shading(light.color - clean, light.variance)
-    corrected = clean + _correction(difference, np.abs(clean), guide_of(geometry, where))
+    corrected = clean + _correction(difference, np.abs(clean), guide_of(geometry, where), levels)
     bounded = np.where(clean < 0.0, corrected, np.maximum(corrected, np.float32(0)))
     return np.where(where[..., None], bounded, np.float32(0))
 
 
-def _correction(difference: Shading, magnitude: F32, guide: Guide) -> F32:
+def _correction(difference: Shading, magnitude: F32, guide: Guide, levels: int = LEVELS) -> F32:
     """A difference, smoothed along surfaces, as far as it is significant, in proportion to the luminance.
 
     Parameters
@@ -174,7 +178,7 @@ def _correction(difference: Shading, magnitude: F32, guide: Guide) -> F32:
         Of shape (H, W), with the variance of its mean luminance.
     magnitude : (H, W, 3) float32
         Of the light to which it is added, 0 or more.
-    guide
+    guide, levels
         Of the wavelet filter.
 
     Returns
@@ -186,7 +190,7 @@ def _correction(difference: Shading, magnitude: F32, guide: Guide) -> F32:
         Array4f(*lanes(difference.color), own),
         lanes(difference.variance),
         guide,
-        levels=LEVELS,
+        levels=levels,
         deviations=None,
     )
     squared = dr.square(dr.dot(smoothed.xyz, Array3f(*REC709_LUMINANCE)))

@@ -17,17 +17,18 @@ from enfilade.arrays import UInt, lanes, rows
 from enfilade.kernels.estimate import Estimate, RayCount, Samples
 from enfilade.kernels.random import one_sequence
 from enfilade.kernels.rays import camera_rays, pixel_centres
-from enfilade.methods.decoupled.denoising import OUTLIER, correct_light, denoise_light
-from enfilade.methods.decoupled.hash_grid import LEVELS
+from enfilade.methods.decoupled import hash_grid
+from enfilade.methods.decoupled.denoising import LEVELS, OUTLIER, correct_light, denoise_light
 from enfilade.methods.decoupled.hash_grid_entries import Entries
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
+from enfilade.methods.decoupled.light_camera import light_camera
 from enfilade.methods.decoupled.paths import WITHIN, Path
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.virtual_images import CHOICES, IN_VIRTUAL_IMAGE
 from enfilade.records import F32, Geometry, Mask, Shading
 from enfilade.renderer import Purpose, Rays
 
-SPP = 16  # paths of a pixel (bathroom, staircase2)
+SPP = 16  # paths of a pixel of the light camera (bathroom, staircase2)
 GATHER_SPP = 8  # gather rays of a pixel
 DENOISED_SAMPLES = 16  # estimates as which a denoised pixel counts
 
@@ -88,7 +89,8 @@ def _estimate(
         estimate.add(spp)
         return estimate
 
-    traced = estimated(shot.integrator.path_traced, SPP, Purpose.VIRTUAL_IMAGES)
+    scale = camera.width // light_camera(shot.walk.path.cameras[frame]).width
+    traced = estimated(shot.integrator.path_traced, SPP // scale**2, Purpose.VIRTUAL_IMAGES)
 
     # Denoise what is gathered, and correct it by what is path traced; a denoised pixel is as reliable as many
     # samples.
@@ -100,7 +102,9 @@ def _estimate(
         in_prepass[1].flat[known_pixels] = True
         for layer, estimates in enumerate(zip(gathered.shadings, traced.shadings, strict=True)):
             shown = in_prepass if layer == 0 else None  # it has all light
-            layers[layer] = _corrected(virtual, *estimates, is_traced, shown, shot.settings.denoiser)
+            layers[layer] = _corrected(
+                virtual, *estimates, is_traced, shown, scale, quality=shot.settings.denoiser
+            )
         times, count = DENOISED_SAMPLES, count + gathered.count
     irradiance = np.hstack(layers)
 
@@ -109,8 +113,10 @@ def _estimate(
     # one pixel, since it is for what lies between, not for the wide paths of other lobes.
     keys = [np.array(key)[chosen] for key in keys]
     sizes = [
-        Entries.of(keys[level : level + LEVELS + 1], irradiance, unit=shot.unit).weighted(times / 4.0**level)
-        for level in range(LEVELS)
+        Entries.of(keys[level : level + hash_grid.LEVELS + 1], irradiance, unit=shot.unit).weighted(
+            times / 4.0**level
+        )
+        for level in range(hash_grid.LEVELS)
     ]
     return Entries.joined(sizes), count
 
@@ -121,6 +127,8 @@ def _corrected(
     traced: Shading,
     where: Mask,
     in_prepass: tuple[F32, Mask] | None,
+    scale: int,
+    *,
     quality: str,
 ) -> F32:
     """Denoise what is gathered, and correct it by what is path traced.
@@ -135,6 +143,8 @@ def _corrected(
     in_prepass
         Light, (H, W, 3), that the prepass images show between these pixels, and where, (H, W); it would be
         black.
+    scale
+        Width of the image over that of the light camera's.
     quality
         Of the denoiser.
 
@@ -153,11 +163,12 @@ def _corrected(
     # Virtual images do not lie in the planes that their depths and normals describe.
     guide = replace(virtual, depth=np.zeros_like(virtual.depth))
     is_within = (virtual.shape_index & WITHIN) > 0
+    levels = LEVELS + scale.bit_length() - 1  # as much of the view, with as many paths, in any size
     corrected = np.zeros_like(few.color)
     for part in (is_within, ~is_within):  # apart, since the denoiser would mix them
         if (where & part).any():
             shown = is_shown & part
             own = replace(few, color=few.color * part[..., None])
             clean = denoise_light(guide, own, shown, quality=quality, outlier=OUTLIER, is_excess_kept=True)
-            corrected[part] = correct_light(guide, clean, many, shown)[part]
+            corrected[part] = correct_light(guide, clean, many, shown, levels=levels)[part]
     return corrected[where]
