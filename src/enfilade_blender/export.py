@@ -59,14 +59,14 @@ def export(job: Job) -> dict[str, Any]:
     report_progress(0.3, "materials")
     shapes = Shapes(job, selection, views, notes)
     elements = shapes.write(evaluated.placed)
-    note_light(selection, evaluated.lamps, notes, has_glass=bool(shapes.kinds & GLASS))
+    note_light(selection, evaluated.lamps, notes, has_glass=bool(shapes.materials.kinds & GLASS))
     report_progress(0.9, "lights")
     lamps, nodes = [lamp for lamp in evaluated.lamps if not is_portal(lamp)], LampNodes(job, selection, notes)
     for lamp in lamps:
         lamp.factor = nodes.factor(lamp)
     lamps = [lamp for lamp in lamps if is_finite(lamp, notes)]
     lamps, sun = split_suns(lamps, notes)
-    if shapes.kinds & GLASS and selection.scene.cycles.caustics_refractive:
+    if shapes.materials.kinds & GLASS and selection.scene.cycles.caustics_refractive:
         note_glass(lamps, notes)
     casts = cast_count(evaluated.instances)
     note_sun(sun, views, selection, notes, casts=casts)
@@ -74,21 +74,21 @@ def export(job: Job) -> dict[str, Any]:
     note_falloff(lamps, selection, notes, casts=casts)
     made = [element for lamp in lamps for element in emitters(lamp, shapes.identifiers, notes)]
     elements = [named(plugin("bsdf", "null"), LAMP), *elements, *made]
-    is_volumetric = bool(shapes.kinds & {"mask", "thindielectric"}) or shapes.has_unseen_lamps
+    is_volumetric = bool(shapes.materials.kinds & {"mask", "thindielectric"}) or shapes.has_unseen_lamps
     is_volumetric = is_volumetric or needs_passing(made, sun)
     elements += environment(selection, sun, job.out, notes)
     if not any(True for element in elements for _ in element.iter("emitter")):
         effect = "every frame would be black: add a lamp, or a world with light"
         notes.add("not-carried", selection.scene.name, "Light", "there is no light", effect)
-    shapes.textures.remove_unused(elements)
-    integrator = _integrator(selection, shapes.kinds, notes, is_volumetric=is_volumetric)
+    shapes.materials.textures.remove_unused(elements)
+    integrator = _integrator(selection, shapes.materials.kinds, notes, is_volumetric=is_volumetric)
     write_scene(job.out / "scene.xml", [integrator, *elements])
     counts = {
         "objects": len(evaluated.placed),
         "instances": evaluated.instances,
         "triangles": shapes.triangles,
-        "materials": shapes.material_count,
-        "textures": len(shapes.textures),
+        "materials": len(shapes.materials),
+        "textures": len(shapes.materials.textures),
     }
     return {**_facts(job, selection), "counts": counts, "notes": notes.to_list()}
 
