@@ -344,7 +344,8 @@ class DecoupledSettings(Section):
     )
     specular_spp: int = option(
         0,
-        "First rays of a pixel with specular lobes, 2 or more; 0: derived from the quality.",
+        "First rays of a pixel with specular lobes, 2 or more (a quarter where they are faint); 0: derived "
+        "from the quality.",
         least=0,
         most=4096,
     )

@@ -13,6 +13,7 @@ from enfilade.methods.decoupled.adaptive_sampling import (
     variance_around,
 )
 from enfilade.methods.decoupled.edges import beside, dilated
+from enfilade.records import Shading
 
 H, W = 20, 30
 
@@ -139,14 +140,15 @@ def test_the_tolerance_follows_the_quality():
 
 
 @pytest.mark.parametrize(
-    ("mean", "variance", "is_faint"), [(0.02, 0.0, True), (0.3, 0.0, False), (0.02, 0.01, False)]
+    ("mean", "variance", "is_faint"),
+    [(0.02, 0.0, True), (0.3, 0.0, False), (0.02, 0.01, True), (0.02, 0.02, False)],
 )
 def test_faint_pixels_change_what_is_displayed_by_little(mean, variance, is_faint):
     # The variance is that of a mean of two rays.
     everywhere = np.ones((H, W), bool)
     estimate = Means(everywhere, np.full((H, W), mean), np.full((H, W), variance))
     sampling = AdaptiveSampling(128, 0.05, 0.0, beneath=np.full((H, W), 0.3, np.float32))
-    rms = np.sqrt(mean**2 + 2 * variance)
+    rms = np.sqrt(mean**2 + variance)
     assert (deviations([0.3], [0.3 + rms])[0] < 0.05) == is_faint
     assert (sampling.is_faint(estimate, everywhere, 2) == is_faint).all()
 
@@ -171,12 +173,32 @@ def test_pixels_with_few_others_around_are_not_faint():
     assert found[10:13, 12:15].all()
 
 
-def test_the_variance_around_a_pixel_is_that_of_independent_noise():
-    noise = np.random.default_rng(3).normal(1.0, 0.1, (64, 64, 1)).astype(np.float32)
-    color, sampled = np.broadcast_to(noise, (64, 64, 3)).copy(), np.ones((64, 64), bool)
+def means_of(rays, counts):
+    """Means of the first rays of each pixel, (H, W), and their variances, as of an estimate."""
+    used = np.arange(rays.shape[2]) < counts[..., None]
+    mean = (rays * used).sum(axis=2) / counts
+    variance = (np.square(rays - mean[..., None]) * used).sum(axis=2) / counts / np.maximum(counts - 1, 1)
+    return Shading(mean[..., None].repeat(3, axis=2).astype(np.float32), variance.astype(np.float32))
+
+
+@pytest.mark.parametrize("level", [1.0, -1.0])
+def test_the_variance_around_a_pixel_is_that_of_single_rays(level):
+    rays = np.random.default_rng(3).normal(level, 0.1, (64, 64, 4))
+    counts, sampled = np.where(np.arange(64) < 20, 1, 4) * np.ones((64, 1), int), np.ones((64, 64), bool)
     sampled[:, 40:] = False
-    color[~sampled] = 7.0
-    assert variance_around(color, sampled)[:, :40].mean() == pytest.approx(0.01, rel=0.1)
+    light = means_of(rays, counts)
+    light.color[~sampled] = light.variance[~sampled] = 0.0
+    found = variance_around(light, sampled, counts)
+    assert found[:, 23:37].mean() == pytest.approx(0.01, rel=0.05)
+    assert found[:, 17:23].mean() == pytest.approx(0.01, rel=0.1)
+    assert found[:, :40].mean() == pytest.approx(0.01, rel=0.05)
+
+
+def test_an_outlier_of_a_single_ray_is_not_certain():
+    light = means_of(np.zeros((H, W, 1)), np.ones((H, W), int))
+    light.color[10, 12] = 20.0
+    found = variance_around(light, np.ones((H, W), bool), np.ones((H, W), int))
+    assert found[10, 12] == pytest.approx(20.0**2 / 49.0, rel=0.05)
 
 
 def test_rays_double_where_the_value_is_uncertain_and_beside_it():

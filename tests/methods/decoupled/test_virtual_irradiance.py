@@ -10,7 +10,8 @@ from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry
 from enfilade.kernels.random import one_sequence
 from enfilade.kernels.rays import camera_rays, pixel_centres
-from enfilade.methods.decoupled import Decoupled, light_camera
+from enfilade.methods.decoupled import Decoupled, light_camera, virtual_irradiance
+from enfilade.methods.decoupled.denoising import CORRECTION_LEVELS
 from enfilade.methods.decoupled.integrator import Integrator
 from enfilade.methods.decoupled.paths import spawn
 from enfilade.methods.decoupled.shot import ShotContext
@@ -175,13 +176,21 @@ def after_prepass(renderer: MitsubaRenderer, camera: Camera) -> ShotContext:
 def test_large_frames_have_a_quarter_of_the_paths_in_each_pixel_of_virtual_images(tmp_path, monkeypatch):
     renderer = room(tmp_path, max_depth=-1)
 
+    smoothed = []
+
+    def correct_light(*arguments, levels, of=virtual_irradiance.correct_light):
+        smoothed.append(levels)
+        return of(*arguments, levels=levels)
+
     def rays() -> int:
         shot = after_prepass(renderer, CAMERAS[0])
         return estimate_virtual_images(shot, 0, shot.prepass_cache(0))[1].rays
 
+    monkeypatch.setattr(virtual_irradiance, "correct_light", correct_light)
     small = rays()
     monkeypatch.setattr(light_camera, "LIGHT_PIXELS", SIZE[0] * SIZE[1] // 4)
     assert rays() / small == pytest.approx((4 + 8) / (16 + 8), rel=0.01)
+    assert smoothed == [CORRECTION_LEVELS, CORRECTION_LEVELS + 1]
 
 
 @pytest.mark.slow

@@ -23,15 +23,15 @@ from enfilade.kernels.tone import (
 )
 from enfilade.methods.decoupled.edges import beside, dilated
 from enfilade.methods.walkthrough import Walkthrough
-from enfilade.records import F32, U32, Mask
+from enfilade.records import F32, U32, Mask, Shading
 from enfilade.settings import DecoupledSettings, ViewingSettings
 
 EDGE_SPP = 16  # rays of a pixel at an edge; their number doubles while its value is uncertain
 DISPLAYED_DEVIATION = 0.0033  # times the square root of the quality: above it a displayed value is uncertain
 SPECULAR_DEVIATION = 2.0  # times that: specular rays, which cost more than camera rays
-SPECULAR_CONTRAST = 1.0 / 3.0  # times that: specular AOVs are refined where half their contrast exceeds it
-FAINT = 1.5  # times that: specular AOVs are faint where half of their root mean square is below it
-AROUND = 7  # pixels: the window over which that is averaged
+SPECULAR_CONTRAST = 1.0 / 3.0  # times the first: AOVs are refined where half their contrast exceeds it
+FAINT = 1.5  # times the first: AOVs are faint where half of what their rays change is below it
+AROUND = 7  # pixels: the window over which rays are averaged
 MIN_AROUND = 8  # sampled pixels of the window
 
 
@@ -99,9 +99,9 @@ class AdaptiveSampling:
         """
         mean, variance = estimate.luminance()
         squared, known = np.zeros(sampled.shape), sampled.astype(np.float64)
-        squared[sampled] = np.array(dr.square(mean) + spp * variance)
-        total, count = _sum_around(squared), _sum_around(known)
-        rms = np.sqrt(total / np.maximum(count, 1.0)).astype(np.float32)
+        squared[sampled] = np.array(dr.square(mean) + (spp - 1.0) * variance)
+        total, count = (_sum_around(of) - of for of in (squared, known))
+        rms = np.sqrt(np.maximum(total, 0.0) / np.maximum(count, 1.0)).astype(np.float32)
         exceeds = self._exceeds(Float(0), lanes(rms), dr.arange(UInt, sampled.size))
         is_faint: Mask = sampled & (count + 0.5 > MIN_AROUND) & ~image(exceeds, *sampled.shape)
         return is_faint
@@ -208,12 +208,21 @@ class AdaptiveSampling:
             spp += more
 
 
-def variance_around(color: F32, sampled: Mask) -> F32:
-    """Variance of the luminance of an image, (H, W, 3), over the sampled pixels around each; (H, W)."""
-    known = sampled.astype(np.float64)
-    value = known * luminance(color)
-    count = np.maximum(_sum_around(known), 1.0)
-    variance = _sum_around(np.square(value)) / count - np.square(_sum_around(value) / count)
+def variance_around(light: Shading, sampled: Mask, counts: npt.NDArray[np.integer[Any]]) -> F32:
+    """Variance of the luminance of single rays in the 7x7 pixels around each, (H, W).
+
+    Parameters
+    ----------
+    light
+        Means of shape (H, W), and their variances; 0 where no pixels were sampled.
+    sampled : (H, W) bool
+    counts : (H, W) integers
+        Rays of each pixel.
+    """
+    mean = luminance(light.color).astype(np.float64)
+    squared = np.square(mean) + (counts - 1.0) * light.variance
+    count = np.maximum(_sum_around(sampled.astype(np.float64)), 1.0)
+    variance = _sum_around(squared) / count - np.square(_sum_around(mean) / count)
     positive: F32 = np.maximum(variance, 0.0).astype(np.float32)
     return positive
 
@@ -244,9 +253,8 @@ def _srgb_encode(linear: Any) -> Any:
 
 
 def _sum_around(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Sums over the pixels around each, without itself, (H, W)."""
-    mean = scipy.ndimage.uniform_filter(values, AROUND, mode="constant")
-    total: npt.NDArray[np.float64] = np.maximum(AROUND**2 * mean - values, 0.0)
+    """Sums over the pixels around each, and itself, (H, W)."""
+    total: npt.NDArray[np.float64] = AROUND**2 * scipy.ndimage.uniform_filter(values, AROUND, mode="constant")
     return total
 
 

@@ -21,7 +21,7 @@ BLOCK = 32  # pixels: regions with a whole empty block of a grid between them ar
 NOISE_SHARE = 0.25  # of the variance of irradiance: low-discrepancy samples have less noise than it tells
 OUTLIER = 64.0  # times the denoised irradiance: brighter estimates are limited where the mean is kept
 NEGLIGIBLE = 1e-2  # of the light of a block: where less is below zero, the correction accounts for it
-LEVELS = 5  # of the wavelet that smooths the correction: 32 pixels to each side
+CORRECTION_LEVELS = 5  # of the wavelet that smooths the correction: 32 pixels to each side
 
 
 def denoise_irradiance(
@@ -135,12 +135,12 @@ def denoise_light(
     if is_excess_kept:
         excess = np.where(where[..., None], light.color - limited, np.float32(0))
         if excess.any():
-            bounded = _with_excess(bounded, excess, magnitude, guide)
+            bounded = _with_excess(bounded, excess, magnitude * where[..., None], guide)
     return bounded
 
 
 def correct_light(
-    geometry: Geometry, clean: F32, light: Shading, where: Mask, *, levels: int = LEVELS
+    geometry: Geometry, clean: F32, light: Shading, where: Mask, *, levels: int = CORRECTION_LEVELS
 ) -> F32:
     """Correct light by noisier estimates without bias, along surfaces, as far as these are certain.
 
@@ -169,7 +169,7 @@ def correct_light(
     return np.where(where[..., None], bounded, np.float32(0))
 
 
-def _correction(difference: Shading, magnitude: F32, guide: Guide, levels: int = LEVELS) -> F32:
+def _correction(difference: Shading, magnitude: F32, guide: Guide, levels: int = CORRECTION_LEVELS) -> F32:
     """A difference, smoothed along surfaces, as far as it is significant, in proportion to the luminance.
 
     Parameters
@@ -236,7 +236,11 @@ def _with_excess(color: F32, excess: F32, weight: F32, guide: Guide) -> F32:
     even, own, squared = proportional(total(excess), weight), luminance(weight), np.square(luminance(excess))
     squared += np.square(own) * np.float32(squared.sum() / max(np.square(own).sum(), 1e-20))
     smoothed, variance = smooth(
-        Array4f(*lanes(excess - even), lanes(own)), lanes(squared), guide, levels=LEVELS, deviations=None
+        Array4f(*lanes(excess - even), lanes(own)),
+        lanes(squared),
+        guide,
+        levels=CORRECTION_LEVELS,
+        deviations=None,
     )
     uneven = smoothed.xyz * (lanes(own) / dr.maximum(smoothed.w, 1e-20))
     difference = dr.square(dr.dot(smoothed.xyz, Array3f(*REC709_LUMINANCE)))

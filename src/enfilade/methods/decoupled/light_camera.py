@@ -42,6 +42,11 @@ def virtual_camera(camera: Camera) -> Camera:
     return light if light is camera else irradiance_camera(camera)
 
 
+def virtual_scale(camera: Camera) -> int:
+    """Width of virtual images over that of the light camera: 1 or :data:`IRRADIANCE_SCALE`."""
+    return virtual_camera(camera).width // light_camera(camera).width
+
+
 def light_reduction(pixels: int) -> int:
     """Width and height of a frame of so many pixels over those of its light camera."""
     return max(round(math.sqrt(pixels / LIGHT_PIXELS)), 1)

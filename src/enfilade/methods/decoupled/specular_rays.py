@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from enfilade.arrays import release_memory, to_float
 from enfilade.kernels.estimate import Confined, RayCount
@@ -34,7 +36,7 @@ from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
 from enfilade.records import F32, Geometry, Mask, Shading
 from enfilade.renderer import PixelFilter, Purpose
 
-FAINT_SHARE = 4  # faint pixels have one in so many of the rays
+FAINT_SHARE = 4  # one in so many of the rays are traced first, and suffice for faint pixels
 
 
 def shade_specular(
@@ -90,12 +92,12 @@ def shade_specular(
         confined=confined,
     )
     spp = specular_spp(shot.settings, shot.frames)
-    few = max(spp // FAINT_SHARE, 1)
+    few = -(-spp // FAINT_SHARE)  # rounded up
     estimate.add(few)
     is_faint = AdaptiveSampling.of(shot.walk, times=FAINT, beneath=beneath).is_faint(estimate, where, few)
     estimate.add(spp - few, ~is_faint[where])
-    sampling.reduce_noise(estimate, where, is_narrow, spp)
-    traced = [_with_variance(of.to_image(where), where, is_faint) for of in estimate.shadings]
+    sampling.reduce_noise(estimate, where, is_narrow & ~is_faint, spp)
+    traced = [of.to_image(where) for of in estimate.shadings]
     count = estimate.count
     del estimate  # its sums take 80 bytes a pixel
     release_memory()
@@ -105,6 +107,8 @@ def shade_specular(
     if tint:
         traced[0] = tint.divided(traced[0])
         release_memory()
+    counts = np.where(is_faint, few, spp)
+    traced = [_with_variance(aov, where, is_faint, counts) for aov in traced]
     used = 1 + max((k for k, aov in enumerate(traced) if aov.color.any()), default=0)
     is_denoised = shot.settings.denoiser != "none"
     aovs = filter_spatially(
@@ -161,10 +165,12 @@ class SpecularShading:
     count: RayCount
 
 
-def _with_variance(aov: Shading, sampled: Mask, is_faint: Mask) -> Shading:
-    """An AOV whose faint pixels, of a single ray perhaps, have the variance of those around."""
-    around = variance_around(aov.color, sampled)
-    return replace(aov, variance=np.where(is_faint, around, aov.variance))
+def _with_variance(
+    aov: Shading, sampled: Mask, is_faint: Mask, counts: npt.NDArray[np.integer[Any]]
+) -> Shading:
+    """An AOV whose faint pixels, of a single ray perhaps, have the variance of the rays around."""
+    variance = variance_around(aov, sampled, counts) / counts.astype(np.float32)
+    return replace(aov, variance=np.where(is_faint, variance, aov.variance))
 
 
 def _looked_up(

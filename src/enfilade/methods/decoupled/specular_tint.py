@@ -29,7 +29,7 @@ class Tint:
     Attributes
     ----------
     sampled : (H, W, 3) float32
-        By the camera rays that specular rays continue; of narrow surfaces, which may have more, as `whole`.
+        By the camera rays that specular rays continue; of pixels with another number of them, as `whole`.
     whole : (H, W, 3) float32
         By :data:`TINT_RAYS`, which are not counted.
     """
@@ -49,7 +49,7 @@ class Tint:
 
 
 def find_tint(
-    shot: ShotContext, frame: int, where: Mask, confined: Confined, narrow: Mask, spp: int
+    shot: ShotContext, frame: int, where: Mask, confined: Confined, others: Mask, spp: int
 ) -> Tint | None:
     """The tint of the pixels of a frame; None where no metal with a texture is seen.
 
@@ -61,10 +61,10 @@ def find_tint(
         Pixels with specular rays.
     confined
         As of the specular rays.
-    narrow : (H, W) bool
-        Those that may have more rays than the first ones.
+    others : (H, W) bool
+        Those that may have more or fewer rays than `spp`.
     spp
-        Number of the first rays of a pixel.
+        Number of rays of all other pixels.
     """
     if not shot.renderer.has_specular_texture():
         return None
@@ -97,4 +97,4 @@ def find_tint(
     sampled = mean()
     estimate.add(max(TINT_RAYS - spp, 0), is_textured)
     whole = mean()
-    return Tint(np.where(narrow[..., None], whole, sampled), whole)
+    return Tint(np.where(others[..., None], whole, sampled), whole)

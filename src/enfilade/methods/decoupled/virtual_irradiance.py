@@ -17,18 +17,18 @@ from enfilade.arrays import UInt, lanes, rows
 from enfilade.kernels.estimate import Estimate, RayCount, Samples
 from enfilade.kernels.random import one_sequence
 from enfilade.kernels.rays import camera_rays, pixel_centres
-from enfilade.methods.decoupled import hash_grid
-from enfilade.methods.decoupled.denoising import LEVELS, OUTLIER, correct_light, denoise_light
+from enfilade.methods.decoupled.denoising import CORRECTION_LEVELS, OUTLIER, correct_light, denoise_light
+from enfilade.methods.decoupled.hash_grid import LEVELS
 from enfilade.methods.decoupled.hash_grid_entries import Entries
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
-from enfilade.methods.decoupled.light_camera import light_camera
+from enfilade.methods.decoupled.light_camera import virtual_scale
 from enfilade.methods.decoupled.paths import WITHIN, Path
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.virtual_images import CHOICES, IN_VIRTUAL_IMAGE
 from enfilade.records import F32, Geometry, Mask, Shading
 from enfilade.renderer import Purpose, Rays
 
-SPP = 16  # paths of a pixel of the light camera (bathroom, staircase2)
+SPP = 16  # paths of a pixel; of the light camera's, if they are denoised (bathroom, staircase2)
 GATHER_SPP = 8  # gather rays of a pixel
 DENOISED_SAMPLES = 16  # estimates as which a denoised pixel counts
 
@@ -89,13 +89,14 @@ def _estimate(
         estimate.add(spp)
         return estimate
 
-    scale = camera.width // light_camera(shot.walk.path.cameras[frame]).width
+    is_denoised = shot.settings.denoiser != "none"
+    scale = virtual_scale(shot.walk.path.cameras[frame]) if is_denoised else 1
     traced = estimated(shot.integrator.path_traced, SPP // scale**2, Purpose.VIRTUAL_IMAGES)
 
     # Denoise what is gathered, and correct it by what is path traced; a denoised pixel is as reliable as many
     # samples.
     layers, times, count = [shading.color for shading in traced.shadings], 1, traced.count
-    if shot.settings.denoiser != "none":
+    if is_denoised:
         gathered = estimated(shot.integrator.gathered, GATHER_SPP, Purpose.GATHERED_VIRTUAL_IMAGES)
         in_prepass = np.zeros((*is_traced.shape, 3), np.float32), np.zeros_like(is_traced)
         in_prepass[0].reshape(-1, 3)[known_pixels] = known_irradiance
@@ -113,10 +114,8 @@ def _estimate(
     # one pixel, since it is for what lies between, not for the wide paths of other lobes.
     keys = [np.array(key)[chosen] for key in keys]
     sizes = [
-        Entries.of(keys[level : level + hash_grid.LEVELS + 1], irradiance, unit=shot.unit).weighted(
-            times / 4.0**level
-        )
-        for level in range(hash_grid.LEVELS)
+        Entries.of(keys[level : level + LEVELS + 1], irradiance, unit=shot.unit).weighted(times / 4.0**level)
+        for level in range(LEVELS)
     ]
     return Entries.joined(sizes), count
 
@@ -163,7 +162,9 @@ def _corrected(
     # Virtual images do not lie in the planes that their depths and normals describe.
     guide = replace(virtual, depth=np.zeros_like(virtual.depth))
     is_within = (virtual.shape_index & WITHIN) > 0
-    levels = LEVELS + scale.bit_length() - 1  # as much of the view, with as many paths, in any size
+    levels = (
+        CORRECTION_LEVELS + scale.bit_length() - 1
+    )  # as much of the view, with as many paths, in any size
     corrected = np.zeros_like(few.color)
     for part in (is_within, ~is_within):  # apart, since the denoiser would mix them
         if (where & part).any():

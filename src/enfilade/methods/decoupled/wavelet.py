@@ -151,6 +151,7 @@ def _filter_level(
     column = Int(pixel) - row * width
     vector = type(colors)
     color, variance = dr.gather(vector, colors, pixel), dr.gather(Float, variances, pixel)
+    own_blurred = dr.gather(Float, blurred, pixel) if deviations else blurred
     normal = dr.gather(Array3f, guide.normals, pixel)
     depth = dr.gather(Float, guide.depths, pixel)
     shape_index = dr.gather(UInt, guide.shape_indices, pixel)
@@ -180,8 +181,7 @@ def _filter_level(
             # Weight it by the difference of luminance in units of the noise of both pixels.
             other, of_tap = dr.gather(vector, colors, tap), surface
             if deviations:
-                both = dr.gather(Float, blurred, pixel) + dr.gather(Float, blurred, tap)
-                deviation = deviations * dr.sqrt(both) + TINY
+                deviation = deviations * dr.sqrt(own_blurred + dr.gather(Float, blurred, tap)) + TINY
                 difference = dr.abs(dr.dot(other - color, Array3f(*REC709_LUMINANCE)))
                 of_tap = surface * dr.exp(-difference / deviation)
 
