@@ -28,7 +28,7 @@ from enfilade.methods.decoupled.virtual_images import CHOICES, IN_VIRTUAL_IMAGE
 from enfilade.records import F32, Geometry, Mask, Shading
 from enfilade.renderer import Purpose, Rays
 
-SPP = 16  # paths of a pixel; of the light camera's, if they are denoised (bathroom, staircase2)
+SPP = 16  # paths of a pixel of the light camera (bathroom, staircase2)
 GATHER_SPP = 8  # gather rays of a pixel
 DENOISED_SAMPLES = 16  # estimates as which a denoised pixel counts
 
@@ -91,12 +91,14 @@ def _estimate(
 
     is_denoised = shot.settings.denoiser != "none"
     scale = virtual_scale(shot.walk.path.cameras[frame]) if is_denoised else 1
+    # A denoiser needs as many paths in any size of the image; without it all pixels have them.
     traced = estimated(shot.integrator.path_traced, SPP // scale**2, Purpose.VIRTUAL_IMAGES)
 
     # Denoise what is gathered, and correct it by what is path traced; a denoised pixel is as reliable as many
     # samples.
     layers, times, count = [shading.color for shading in traced.shadings], 1, traced.count
     if is_denoised:
+        levels = CORRECTION_LEVELS + scale.bit_length() - 1  # the same part of the view in any size
         gathered = estimated(shot.integrator.gathered, GATHER_SPP, Purpose.GATHERED_VIRTUAL_IMAGES)
         in_prepass = np.zeros((*is_traced.shape, 3), np.float32), np.zeros_like(is_traced)
         in_prepass[0].reshape(-1, 3)[known_pixels] = known_irradiance
@@ -104,7 +106,7 @@ def _estimate(
         for layer, estimates in enumerate(zip(gathered.shadings, traced.shadings, strict=True)):
             shown = in_prepass if layer == 0 else None  # it has all light
             layers[layer] = _corrected(
-                virtual, *estimates, is_traced, shown, scale, quality=shot.settings.denoiser
+                virtual, *estimates, is_traced, shown, levels, quality=shot.settings.denoiser
             )
         times, count = DENOISED_SAMPLES, count + gathered.count
     irradiance = np.hstack(layers)
@@ -126,7 +128,7 @@ def _corrected(
     traced: Shading,
     where: Mask,
     in_prepass: tuple[F32, Mask] | None,
-    scale: int,
+    levels: int,
     *,
     quality: str,
 ) -> F32:
@@ -142,8 +144,8 @@ def _corrected(
     in_prepass
         Light, (H, W, 3), that the prepass images show between these pixels, and where, (H, W); it would be
         black.
-    scale
-        Width of the image over that of the light camera's.
+    levels
+        Of the wavelet that smooths the correction.
     quality
         Of the denoiser.
 
@@ -162,9 +164,6 @@ def _corrected(
     # Virtual images do not lie in the planes that their depths and normals describe.
     guide = replace(virtual, depth=np.zeros_like(virtual.depth))
     is_within = (virtual.shape_index & WITHIN) > 0
-    levels = (
-        CORRECTION_LEVELS + scale.bit_length() - 1
-    )  # as much of the view, with as many paths, in any size
     corrected = np.zeros_like(few.color)
     for part in (is_within, ~is_within):  # apart, since the denoiser would mix them
         if (where & part).any():
