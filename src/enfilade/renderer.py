@@ -202,8 +202,10 @@ class BsdfSample:
         Whether the lobe shows images: it is a delta lobe, or hardly wider.
     is_passed : Bool
         Whether this is such a null interaction.
+    is_interface : Bool
+        Whether the surface bounds a refractive medium.
     is_within : Bool
-        Whether the path continues within a refractive medium: on the inner side of an interface.
+        Whether the path goes on within it: on the inner side of the interface.
     """
 
     rays: Rays
@@ -214,6 +216,7 @@ class BsdfSample:
     is_split: Any
     is_image: Any
     is_passed: Any
+    is_interface: Any
     is_within: Any
 
 

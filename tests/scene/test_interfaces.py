@@ -7,7 +7,7 @@ import pytest
 from enfilade.arrays import Array3f, Bool, UInt, rows
 from enfilade.kernels.random import one_sequence
 from enfilade.renderer import Branch, Rays
-from support.mitsuba_scene import opened, rgb, write
+from support.mitsuba_scene import HOLES, opened, rgb, write, write_holes
 
 COUNT = 1 << 17
 GLASS = '<float name="spec_trans" value="1"/><float name="roughness" value="0.4"/>'
@@ -15,6 +15,16 @@ INTERFACES = {
     "rough dielectric": '<bsdf type="roughdielectric"><float name="alpha" value="0.3"/></bsdf>',
     "principled": f'<bsdf type="principled">{GLASS}<float name="eta" value="1.5"/></bsdf>',
     "of a given specular": f'<bsdf type="principled">{GLASS}<float name="specular" value="0.8"/></bsdf>',
+}
+# Glass under a bump map, whose slopes reflect no light totally at the angles below.
+BUMPY = (
+    f'<bsdf type="bumpmap">{HOLES.format("bump", "bilinear")}<float name="scale" value="0.02"/>'
+    '<bsdf type="{}"/></bsdf>'
+)
+CLEAR = {
+    "glass": '<bsdf type="dielectric"/>',
+    "bumpy glass": BUMPY.format("dielectric"),
+    "bumpy pane": BUMPY.format("thindielectric"),
 }
 OTHERS = {
     "partly transmitting": '<bsdf type="principled"><float name="spec_trans" value="0.5"/></bsdf>',
@@ -65,6 +75,27 @@ def test_branches_add_up_to_the_whole(tmp_path, name, from_above):
         assert dr.all(~counts | (sample.rays.direction.z * side > 0.0))
     assert not np.any(rows(parts[1].direct))
     assert np.any(rows(parts[0].direct)) == np.any(rows(whole.direct))
+
+
+@pytest.mark.parametrize("from_above", [True, False])
+@pytest.mark.parametrize("name", CLEAR)
+def test_both_branches_of_clear_interfaces_are_followed(tmp_path, name, from_above):
+    """Also below a bump map: without chance, the reflection has Fresnel's share in every sample."""
+    write_holes(tmp_path)
+    renderer = plane(tmp_path, CLEAR[name])
+    whole = scattered(renderer, 30.0, from_above)
+    parts = [scattered(renderer, 30.0, from_above, int(branch)) for branch in Branch]
+    assert all(dr.all(part.is_split & part.is_alive) for part in parts)
+    assert sum(map(moments, parts)) == pytest.approx(moments(whole), abs=0.01)
+    weights = [rows(part.throughput)[:, 0] for part in parts]
+    assert all(np.ptp(weight) < 1e-3 for weight in weights)
+    assert weights[0].max() < 0.1 < weights[1].min()
+    solid = name != "bumpy pane"
+    assert all(dr.all(part.is_interface) == solid for part in parts)
+    assert [bool(dr.all(part.is_within)) for part in parts] == [
+        solid and not from_above,
+        solid and from_above,
+    ]
 
 
 def test_a_reflection_is_as_strong_as_its_share(tmp_path):

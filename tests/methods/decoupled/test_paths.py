@@ -1,9 +1,12 @@
 """Paths as lanes: joined in order, and what they contribute."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import drjit as dr
 import numpy as np
 
-from enfilade.arrays import Array3f, UInt, rows
+from enfilade.arrays import Array3f, Bool, UInt, rows
 from enfilade.kernels.random import one_sequence
 from enfilade.methods.decoupled.paths import Contributions, compact, joined, merged, spawn
 from enfilade.renderer import Bounce, Branch, Rays
@@ -25,6 +28,15 @@ def test_trees_are_joined_lane_by_lane():
     states = np.concatenate([np.array(p.sampler.path) for p, _ in parts])
     assert np.array(path.sampler.path).tolist() == states.tolist()
     assert path.bounce is None
+
+
+def test_only_interfaces_lead_into_glass_and_out_of_it():
+    path, _ = made(4, 1)
+    path = replace(path, is_within=Bool([False, True, True, False]))
+    sample = SimpleNamespace(
+        is_interface=Bool([True, True, False, False]), is_within=Bool([True, False, False, False])
+    )
+    assert np.array(path.is_within_after(sample)).tolist() == [True, False, True, False]
 
 
 def test_a_single_tree_stays_itself():

@@ -195,7 +195,7 @@ class PathKernels:
             bounces=path.bounces + dr.select(sample.is_image | sample.is_passed, UInt(1), BROAD_BOUNCES),
             depth=depth,
             branch=path.branch,
-            is_within=sample.is_within,
+            is_within=path.is_within_after(sample),
         )
 
         # Query the cache at the next vertex.

@@ -12,7 +12,7 @@ import numpy as np
 from enfilade.arrays import Array3f, Bool, Float, UInt, lanes, opaque
 from enfilade.kernels.random import PaddedSobolSampler
 from enfilade.kernels.replay import padded
-from enfilade.renderer import Bounce, Branch, Rays, ShadingPoint, Surfaces
+from enfilade.renderer import Bounce, Branch, BsdfSample, Rays, ShadingPoint, Surfaces
 
 WITHIN = 1 << 29  # added to the index of shapes within glass, such as the floor below a block
 
@@ -66,6 +66,10 @@ class Path:
     def shape_at(self, surfaces: Surfaces) -> Any:
         """Shape indices of surfaces in the cache, UInt: within glass they have other light than beside it."""
         return surfaces.shape_index + dr.select(self.is_within, UInt(WITHIN), UInt(0))
+
+    def is_within_after(self, sample: BsdfSample) -> Any:
+        """Whether the path is within a refractive medium after a bounce: interfaces alone change it; Bool."""
+        return dr.select(sample.is_interface, sample.is_within, self.is_within)
 
     def on_branch(self, branch: Branch) -> Path:
         """The same paths on a branch."""

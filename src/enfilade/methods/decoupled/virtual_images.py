@@ -146,7 +146,7 @@ class VirtualImages:
             bounce=sample.bounce,
             width=path.width_at(point),
             sampler=sampler,
-            is_within=sample.is_within,
+            is_within=path.is_within_after(sample),
         )
 
         # Intersect.

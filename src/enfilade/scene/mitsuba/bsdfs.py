@@ -34,6 +34,17 @@ def constant(bsdf: Any, name: str) -> float:
     return float(value[0]) if len(value) == 1 else math.nan
 
 
+def below_maps(bsdf: Any) -> Any:
+    """The BSDF below bump and normal maps."""
+    return below_maps(nested(bsdf)[0]) if bsdf.class_name() in MAPS else bsdf
+
+
+def is_solid(bsdf: Any) -> bool:
+    """Whether a BSDF is an interface with a refractive medium on its inner side."""
+    of = below_maps(bsdf)
+    return of.class_name() == "SmoothDielectric" or rough_ior(of) > 0.0
+
+
 def rough_ior(bsdf: Any) -> float:
     """Relative index of refraction of a rough interface; 0 of other BSDFs."""
     is_glass = all(constant(bsdf, name) == value for name, value in GLASS.items())

@@ -26,9 +26,11 @@ from enfilade.kernels.random import one_sequence
 from enfilade.renderer import Branch
 from enfilade.scene.mitsuba.bsdfs import (
     base,
+    below_maps,
     classes,
     is_diffuse_on,
     is_narrow,
+    is_solid,
     is_textured_metal,
     is_turned,
     mixes_delta_lobes,
@@ -82,10 +84,8 @@ class Lobes:
             bsdf_table(scene, lambda bsdf: registry_index(mi.BSDFPtr(base(bsdf, is_front=False))), UInt),
         )
         self._turned = bsdf_table(scene, is_turned)
-        self._solid = bsdf_table(
-            scene, lambda bsdf: bsdf.class_name() == "SmoothDielectric" or rough_ior(bsdf) > 0.0
-        )
-        self._clear = bsdf_table(scene, lambda bsdf: bsdf.class_name() in CLEAR)
+        self._solid = bsdf_table(scene, is_solid)
+        self._clear = bsdf_table(scene, lambda bsdf: below_maps(bsdf).class_name() in CLEAR)
         self._rough_ior = bsdf_table(scene, rough_ior, Float)
         self._narrow = bsdf_table(scene, is_narrow)
         self._coated = bsdf_table(scene, lambda bsdf: classes(bsdf) <= COATED)

@@ -187,6 +187,7 @@ class LightTransport:
             is_split=Bool(False),
             is_image=Bool(False),
             is_passed=Bool(False),
+            is_interface=Bool(False),
             is_within=Bool(False),
         )
 
@@ -237,6 +238,7 @@ class LightTransport:
         ray = si.spawn_ray(si.to_world(wo))
         bounce = Bounce(Array3f(si.p), pdf, Bool(is_delta), Bool(soft_only))
         is_passed = self._shadow_rays.is_passed(si, bsdf, is_null)
+        is_interface = self._lobes.is_solid(si, bsdf)
         return BsdfSample(
             rays=Rays(Array3f(ray.o), Array3f(ray.d)),
             bounce=dr.select(is_passed, point.bounce, bounce) if point.bounce else bounce,
@@ -246,7 +248,8 @@ class LightTransport:
             is_split=Bool(point.has_specular & is_split & (branch is not None)),
             is_image=Bool(is_delta | self._lobes.is_narrow(si, bsdf)),
             is_passed=is_passed,
-            is_within=Bool(self._lobes.is_solid(si, bsdf) & (wo.z < 0.0)),
+            is_interface=Bool(is_interface),
+            is_within=Bool(is_interface & (wo.z < 0.0)),
         )
 
     def _next_event(
