@@ -24,7 +24,7 @@ def test_lines_are_rate_limited_and_the_last_one_always_comes():
         clock.now += 2.0
         monitor.progress("frames", done, 8)
     assert lines[0] == "frames: 7 to do"
-    assert lines[1] == "frames: 4/8, 0:06 passed, about 0:06 left"
+    assert lines[1] == "frames: 4/8, 0:06 passed, about 0:08 left"
     assert lines[-1] == "frames: 8/8, took 0:14"
     assert len(lines) == 4
 
@@ -35,7 +35,7 @@ def test_items_done_before_are_not_part_of_the_pace():
     monitor.progress("frames", 91, 100)
     clock.now = 20.0
     monitor.progress("frames", 92, 100)
-    assert lines == ["frames: 9 to do", "frames: 92/100, 0:20 passed, about 1:20 left"]
+    assert lines == ["frames: 9 to do", "frames: 92/100, 0:20 passed, about 2:40 left"]
 
 
 def test_nothing_is_estimated_before_there_is_progress():
@@ -86,8 +86,9 @@ def test_clock_time(seconds, text):
     assert clock_time(seconds) == text
 
 
-def test_quiet_is_silent_and_a_log_gets_lines(capsys):
-    for quiet, expected in ((True, ""), (False, "frames: 1/1, took 0:00\n")):
+def test_quiet_shows_messages_alone_and_a_log_gets_all_lines(capsys):
+    for quiet, expected in ((True, "a message\n"), (False, "frames: 1/1, took 0:00\na message\n")):
         with watch(quiet=quiet) as monitor:
             monitor.progress("frames", 1, 1)
+            monitor.message("a message")
         assert capsys.readouterr().err == expected

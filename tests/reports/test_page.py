@@ -167,14 +167,15 @@ def test_without_a_reference_its_layers_are_missing(copied, tmp_path):
 
 
 def test_a_run_without_its_video_is_not_finished(tmp_path):
-    """Also with that of another codec, while the new one is encoded."""
+    """Also with that of other settings, while the new one is encoded."""
     folder = synthetic_run(tmp_path / "run")
-    job = json.loads((folder / "job.json").read_text())
-    job["settings"]["video"]["codec"] = "ffv1"
-    write_json(folder / "job.json", job)
-    assert "state state-unfinished" in written(folder, tmp_path)[1]
-    job["settings"]["video"]["codec"] = "h264"
-    write_json(folder / "job.json", job)
+    before = (folder / "job.json").read_text()
+    for name, other in (("codec", "ffv1"), ("quality", 20), ("look", "warm")):
+        job = json.loads(before)
+        job["settings"]["video"][name] = other
+        write_json(folder / "job.json", job)
+        assert "state state-unfinished" in written(folder, tmp_path)[1]
+    (folder / "job.json").write_text(before)
     assert "state state-finished" in written(folder, tmp_path)[1]
     (folder / "video.mp4").unlink()
     assert "state state-unfinished" in written(folder, tmp_path)[1]
@@ -196,6 +197,10 @@ def test_a_running_run_is_shown_as_far_as_it_is_finished(tmp_path):
         lock.release()
     assert numbers_of(data) == [1, 2, 3, 5]
     assert notes == []
+    notes, text, data = written(folder, tmp_path, reference=synthetic_run(tmp_path / "reference"))
+    assert notes == ["6 frames are missing, so that the run is not compared with the reference"]
+    assert "Difference from the reference" not in text
+    assert numbers_of(data) == [1, 2, 3, 5]
     assert {file: file.read_bytes() for file in folder.rglob("*.[!l]*")} == before  # of all but run.lock
 
 

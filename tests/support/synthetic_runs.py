@@ -8,7 +8,7 @@ from enfilade.files import write_json
 from enfilade.images import write_exr
 from enfilade.records import Provenance
 from enfilade.runs.folder import RunFolder
-from enfilade.settings import Settings
+from enfilade.settings import Settings, VideoSettings
 
 SIZE = (64, 48)
 FRAMES = tuple(range(1, 11))
@@ -160,7 +160,10 @@ def synthetic_run(
             _finish(run, "frames", number, {"provenance": counts}, [file])
         if finished is None and has_video:
             (folder / "video.mp4").write_bytes(b"a video")
-            encoded = {"video": {"codec": "h264", "exposure_ev": 0.0}}
+            table = VideoSettings().to_table()
+            encoded = {
+                "video": {name: table[name] for name in table if name != "ocio"} | {"exposure_ev": 0.0}
+            }
             _finish(run, "video", FRAMES[0], encoded, [folder / "video.mp4"])
     return folder
 

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 
 import click
 from rich.console import Console
@@ -19,7 +20,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from enfilade.monitor import SILENCE, Monitor
+from enfilade.monitor import Monitor
 
 LINE_EVERY_S = 5.0  # at most one line of progress of a stage in this time
 PACE_S = 3600.0  # over which a bar estimates its pace: a task may take many minutes
@@ -41,7 +42,7 @@ class BarMonitor:
     def progress(self, name: str, done: int, total: int) -> None:
         """Move the bar of a stage."""
         if name not in self._tasks:
-            self._tasks[name] = self._bars.add_task(name, total=total, completed=max(done - 1, 0))
+            self._tasks[name] = self._bars.add_task(name, total=total, completed=done)
         self._bars.update(self._tasks[name], completed=done, total=total)
 
     def message(self, text: str) -> None:
@@ -52,7 +53,7 @@ class BarMonitor:
 @dataclass
 class _Stage:
     started_s: float
-    first: int  # items done when it started
+    first: int  # items done then
     shown_s: float
 
 
@@ -84,7 +85,7 @@ class LineMonitor:
         """Write the state of a stage when it begins, when it ends, and when its last line is old enough."""
         now = self._clock()
         if name not in self._stages:
-            self._stages[name] = _Stage(now, max(done - 1, 0), now)
+            self._stages[name] = _Stage(now, done, now)
             if done < total:
                 self._write(f"{name}: {total - done} to do")
                 return
@@ -98,6 +99,26 @@ class LineMonitor:
                 left = passed / (done - stage.first) * (total - done)
                 times += f", about {clock_time(left)} left"
             self._write(f"{name}: {done}/{total}, {times}")
+
+    def message(self, text: str) -> None:
+        """Write a line."""
+        self._write(text)
+
+
+class MessageMonitor:
+    """Messages as lines, and no progress.
+
+    Parameters
+    ----------
+    write
+        Writes one line.
+    """
+
+    def __init__(self, write: Callable[[str], object]) -> None:
+        self._write = write
+
+    def progress(self, name: str, done: int, total: int) -> None:
+        """Show nothing."""
 
     def message(self, text: str) -> None:
         """Write a line."""
@@ -138,12 +159,13 @@ def clock_time(seconds: float) -> str:
 
 @contextmanager
 def watch(*, quiet: bool) -> Iterator[Monitor]:
-    """A monitor that fits the place: silent, bars on a terminal, or lines in a log."""
+    """A monitor on stderr: messages alone, bars on a terminal, or lines in a log."""
     console = Console(stderr=True)
+    write = partial(click.echo, err=True)
     if quiet:
-        yield SILENCE
+        yield MessageMonitor(write)
     elif not console.is_terminal:
-        yield LineMonitor(lambda line: click.echo(line, err=True))
+        yield LineMonitor(write)
     else:
         columns = (
             TextColumn("{task.description:<12}"),

@@ -91,7 +91,7 @@ def command(
         click.echo(json.dumps(begun, indent=2) if as_json else f"run     {folder}")
         return
     with watch(quiet=quiet) as monitor:
-        if job.method == "reference":
+        if job.method == "reference" and not quiet:
             monitor.message(reference_forecast(job))
         summary = render(job, folder, monitor, team, is_verified=is_verified, has_preflight=True)
     show_run(folder, summary, as_json=as_json)

@@ -75,9 +75,15 @@ class Film:
         if not run.there:
             self.notes.append("no frame is finished yet")
             return
-        step = self._fit(CAUTION * max_bytes, is_compared=bool(references))
+        is_compared = bool(references) and run.has_all_frames
+        if references and not is_compared:
+            left = len(run.numbers) - len(run.there)
+            self.notes.append(
+                f"{left} frames are missing, so that the run is not compared with the reference"
+            )
+        step = self._fit(CAUTION * max_bytes, is_compared=is_compared)
         kept = sorted({*run.there[::step], run.there[-1]})
-        if references:
+        if is_compared:
             self.difference = self._compare(references, set(kept), monitor)
         else:
             for count, index in enumerate(kept, 1):

@@ -93,7 +93,8 @@ def write_report(
     for note in notes:
         monitor.message(note)
     variables = contents(shown, film, None if source is None else _summary(source))
-    variables |= {"notes": notes, "references": [str(of.resolve()) for of in references]}
+    compared = () if film.difference is None else references
+    variables |= {"notes": notes, "references": [str(of.resolve()) for of in compared]}
     file = run / PAGE if out is None else Path(out)
     write_page(file, "report", variables)
     return file

@@ -107,9 +107,14 @@ class ReportedRun:
     def is_finished(self) -> bool:
         """Whether all frames and the video, as it is set, are finished."""
         line = self._run.line(VIDEO.name, self.numbers[0])
-        wanted = {"exposure_ev": self.viewing_settings.exposure_ev, "codec": self.video.codec}
-        is_encoded = line is not None and wanted.items() <= line["video"].items()
-        return is_encoded and len(self.there) == len(self.numbers)
+        wanted = self.video.to_table() | {"exposure_ev": self.viewing_settings.exposure_ev}
+        del wanted["ocio"]  # a path, which the identity of a video leaves out
+        return self.has_all_frames and line is not None and wanted.items() <= line["video"].items()
+
+    @property
+    def has_all_frames(self) -> bool:
+        """Whether all frames are finished and have their files."""
+        return len(self.there) == len(self.numbers)
 
     def frame(self, index: int) -> DeliveredFrame:
         """Read a frame; its checksum is compared.

@@ -207,6 +207,7 @@ class _Loop:
         self._monitor = monitor
         self._totals = Counter(task.pass_name for task in everything)
         self._counts = self._totals - Counter(task.pass_name for task in left)
+        self._begun: set[str] = set()  # names of passes
         self._in_hand: dict[int, Order] = {}
         self._blocks: dict[int, int] = {}  # of the workers
         self.reduction = reduction  # of the paths in flight, after a lack of memory
@@ -255,6 +256,9 @@ class _Loop:
             if task is None:
                 break
             self._in_hand[slot], self._blocks[slot] = Order(task, self.reduction), block_of(task)
+            if task.pass_name not in self._begun:
+                self._begun.add(task.pass_name)
+                self._show(task.pass_name)
             self._executor.begin(slot, self._in_hand[slot])
         return bool(self._in_hand or self._delayed)
 
@@ -263,8 +267,12 @@ class _Loop:
         self._run.finish(line if order.reduction == 1 else line | {"reduction": order.reduction})
         self._graph.finish(task)
         self._counts[task.pass_name] += 1
-        self._monitor.progress(task.pass_name, self._counts[task.pass_name], self._totals[task.pass_name])
+        self._show(task.pass_name)
         self._in_a_row = 0
+
+    def _show(self, name: str) -> None:
+        """Show the progress of a pass."""
+        self._monitor.progress(name, self._counts[name], self._totals[name])
 
     def _fail(self, order: Order, failure: Failure) -> None:
         if failure.kind is FailureKind.FATAL:
