@@ -45,11 +45,12 @@ def camera_path(views: list[View], selection: Selection) -> dict[str, Any]:
 
     Beside nerfstudio's keys, a frame may have ``principal_point`` (shares of width and height, from the
     left and the top), ``aperture_radius`` and ``focus_distance`` (scene units); the path has ``cuts``
-    (numbers of frames, from 1, that begin a shot), ``shutter`` (share of a frame) and ``first_frame``, the
-    number of its first frame in Blender.
+    (numbers of frames, from 1, that begin a shot) where markers bind cameras, ``shutter`` (share of a frame)
+    and ``first_frame``, the number of its first frame in Blender.
     """
     render = selection.scene.render
     cuts = [i for i in range(2, len(views) + 1) if views[i - 1].name != views[i - 2].name]
+    is_cut = any(marker.camera is not None for marker in selection.scene.timeline_markers)
     frames = [{"camera_to_world": view.pose.tolist(), "fov": view.fov_deg, **view.lens} for view in views]
     return {
         "camera_type": "perspective",
@@ -57,7 +58,7 @@ def camera_path(views: list[View], selection: Selection) -> dict[str, Any]:
         "render_height": selection.size[1],
         "fps": render.fps / render.fps_base,
         "first_frame": selection.frames[0],
-        "cuts": cuts,
+        **({"cuts": cuts} if is_cut else {}),  # else jumps are detected
         **({"shutter": render.motion_blur_shutter} if render.use_motion_blur else {}),
         "camera_path": frames,
     }

@@ -48,7 +48,7 @@ def _linked(placed: Sequence[Placed], total: int, shader_of: Callable[[Any], Sha
     """Linked duplicates as copies of one; objects whose materials tell them apart stay as they are."""
     groups: dict[Any, list[Placed]] = {}
     for item in placed:
-        key = id(item.mesh), item.slots, item.colour, item.index, item.is_seen
+        key = id(item.mesh), item.slots, item.colour, item.index, item.is_seen, item.has_shadow
         groups.setdefault(key, []).append(item)
     result = []
     for items in groups.values():

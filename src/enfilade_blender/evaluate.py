@@ -40,7 +40,7 @@ SETTINGS = {  # of a render of nothing
     "use_freestyle": False,  # it draws with EEVEE, and its modules run scripts
 }
 UV_NODES = ("UVMAP", "NORMAL_MAP", "TANGENT")  # that name a UV map
-RAYS_OF_OBJECTS = ("diffuse", "glossy", "transmission", "shadow")
+RAYS_OF_OBJECTS = ("diffuse", "glossy", "transmission")
 RAYS_OF_LAMPS = ("diffuse", "glossy", "transmission")
 
 
@@ -202,6 +202,7 @@ def _place(instance: Any, meshes: dict[int, Mesh], notes: Notes, names: Attribut
         colour=tuple(obj.color),
         index=obj.pass_index,
         is_seen=obj.visible_camera and (instance.parent or obj).visible_camera,
+        has_shadow=obj.visible_shadow and (instance.parent or obj).visible_shadow,
     )
 
 

@@ -95,7 +95,7 @@ def export(job: Job) -> dict[str, Any]:
 
 def _facts(job: Job, selection: Selection) -> dict[str, Any]:
     scene = selection.scene
-    view = scene.view_settings
+    view, display = selection.colour_management
     return {
         "format": "enfilade-import",
         "version": 1,
@@ -109,7 +109,7 @@ def _facts(job: Job, selection: Selection) -> dict[str, Any]:
         "size": list(selection.size),
         "exposure_ev": view.exposure + math.log2(max(scene.cycles.film_exposure, 1e-6)),
         "view": {
-            "display": scene.display_settings.display_device,
+            "display": display.display_device,
             "view_transform": view.view_transform,
             "look": view.look,
         },

@@ -28,7 +28,7 @@ LEAST_CLAMP = 10.0  # Cycles' own limit of indirect light; a lower one makes pic
 def note_settings(job: Job, selection: Selection, notes: Notes) -> None:
     """Note settings of the scene's view, frames, view layers and of what follows the render."""
     scene = selection.scene
-    view, render = scene.view_settings, scene.render
+    (view, _), render = selection.colour_management, scene.render
     space = getattr(getattr(bpy.data, "colorspace", None), "working_space", LINEAR)  # from Blender 5.0 on
     tones, picture = "the tones of the picture differ", "the picture is as Cycles alone renders it"
     settings = {
@@ -48,6 +48,7 @@ def note_settings(job: Job, selection: Selection, notes: Notes) -> None:
         ("Stereoscopy", "its pair of views", "there is one, of the camera itself"): render.use_multiview,
         ("Simplify: Culling", "its culling", "objects that it removes are there"): render.use_simplify
         and (scene.cycles.use_camera_cull or scene.cycles.use_distance_cull),
+        ("Metadata", "what is burnt into the picture", "it is without text"): render.use_stamp,
         ("Frame Step", f"its step of {scene.frame_step}", "every frame is rendered"): scene.frame_step != 1,
     }
     for (name, what, effect), is_used in settings.items():

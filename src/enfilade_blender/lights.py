@@ -117,8 +117,9 @@ def split_suns(lamps: list[Lamp], notes: Notes) -> tuple[list[Lamp], Sun | None]
         if lamp is not brightest:
             what, effect = "a sun beside a brighter one has no disc", "its shadows have sharp edges"
             notes.add("approximated", lamp.name, "Angle", what, effect)
-    direction = _axis(brightest.matrix)
-    sun = Sun(brightest.name, direction, lamp_colour(brightest), float(brightest.data.angle))
+    _note_unusual(brightest, notes)
+    direction, irradiance = _axis(brightest.matrix), _positive(brightest, notes)
+    sun = Sun(brightest.name, direction, irradiance, float(brightest.data.angle))
     return [lamp for lamp in lamps if lamp is not brightest], sun
 
 
@@ -139,12 +140,7 @@ def needs_passing(made: list[Element], sun: Sun | None) -> bool:
 
 def emitters(lamp: Lamp, identifiers: Identifiers, notes: Notes) -> list[Element]:
     """Elements of one lamp; none for one that is dark, or takes light away."""
-    data, name = lamp.data, lamp.name
-    r, g, b = lamp_colour(lamp)
-    if min(r, g, b) < 0.0:
-        what, effect = "its negative light is left out", "surfaces are brighter: Blender takes light away"
-        notes.add("not-carried", name, "Power", what, effect)
-    colour = max(r, 0.0), max(g, 0.0), max(b, 0.0)
+    data, colour = lamp.data, _positive(lamp, notes)
     if max(colour) <= 0.0:
         return []
     _note_unusual(lamp, notes)
@@ -165,8 +161,17 @@ def emitters(lamp: Lamp, identifiers: Identifiers, notes: Notes) -> list[Element
     light = plugin("emitter", "area", radiance=_scaled(colour, sphere_radiance(1.0, radius)))
     shape = plugin("shape", "sphere", light, _surface(lamp), radius=radius)
     shape.append(_vector("center", place, tag="point"))
-    shape.set("id", identifiers.unique(name))
+    shape.set("id", identifiers.unique(lamp.name))
     return [shape]
+
+
+def _positive(lamp: Lamp, notes: Notes) -> Colour:
+    """The colour of a lamp; what is negative is 0, with a note."""
+    r, g, b = lamp_colour(lamp)
+    if min(r, g, b) < 0.0:
+        what, effect = "its negative light is left out", "surfaces are brighter: Blender takes light away"
+        notes.add("not-carried", lamp.name, "Power", what, effect)
+    return max(r, 0.0), max(g, 0.0), max(b, 0.0)
 
 
 def _area(lamp: Lamp, colour: Colour, identifiers: Identifiers, notes: Notes) -> list[Element]:

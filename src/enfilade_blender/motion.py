@@ -22,6 +22,8 @@ LISTED = 20  # objects that are named
 TOLERANCE = 1e-5
 DEFORMING = ("MESH_CACHE", "MESH_SEQUENCE_CACHE", "CLOTH", "SOFT_BODY", "OCEAN", "WAVE", "FLUID", "BUILD")
 CARRYING = ("CAMERA", "EMPTY", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE")  # types without a surface
+# Beside power and colour; exposure and temperature are from Blender 4.5 on.
+LIGHT_NUMBERS = (*SIZES, "exposure", "use_temperature", "temperature", "use_shadow")
 TARGETS = ("object", "target", "origin", "mirror_object", "offset_object", "texture_coords_object")
 
 
@@ -124,7 +126,7 @@ class Motion:
         graph = bpy.context.evaluated_depsgraph_get()
         check_generated(graph, self._limits)
         scene = self._selection.scene
-        exposure = scene.view_settings.exposure, scene.cycles.film_exposure
+        exposure = self._selection.colour_management[0].exposure, scene.cycles.film_exposure
         state: dict[Any, Any] = {("exposure", scene.name): ((), exposure)}
         for obj in self._objects:
             bones = [bone.matrix.copy() for bone in obj.pose.bones] if obj.type == "ARMATURE" else ()
@@ -133,8 +135,8 @@ class Motion:
                 continue
             self._shown.add(obj.name)
             if obj.type == "LIGHT":
-                sizes = (getattr(obj.data, name, 0.0) for name in SIZES)
-                state["light", obj.name] = (), (obj.data.energy, *obj.data.color, *sizes)
+                numbers = (float(getattr(obj.data, name, 0.0)) for name in LIGHT_NUMBERS)
+                state["light", obj.name] = (), (obj.data.energy, *obj.data.color, *numbers)
             elif obj.type not in CARRYING:
                 state["shape", obj.name] = _bounds(obj.evaluated_get(graph))
         self._is_cut |= len(graph.object_instances) > COMPARED

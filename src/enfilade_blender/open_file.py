@@ -13,6 +13,7 @@ from enfilade_blender.failure import ExportError
 from enfilade_blender.job import Job
 from enfilade_blender.notes import Notes
 from enfilade_blender.records import Selection
+from enfilade_blender.usd import import_usd
 
 IMPORTERS: dict[str, Callable[..., Any]] = {
     **dict.fromkeys(
@@ -20,11 +21,9 @@ IMPORTERS: dict[str, Callable[..., Any]] = {
     ),
     ".fbx": lambda file: bpy.ops.import_scene.fbx(filepath=file),
     ".obj": lambda file: bpy.ops.wm.obj_import(filepath=file),
-    **dict.fromkeys(
-        (".usd", ".usda", ".usdc", ".usdz"),
-        lambda file: bpy.ops.wm.usd_import(filepath=file, import_subdiv=True),
-    ),
+    **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), import_usd),
 }
+HAVE_RATE = (".fbx", ".usd", ".usda", ".usdc", ".usdz")  # others have no frame rate
 ALPHA_OF_FILES = {  # modes by the endings of files
     ".exr": "PREMUL",
     **dict.fromkeys((".png", ".webp", ".tga", ".bmp", ".jpg", ".jpeg"), "STRAIGHT"),
@@ -64,18 +63,28 @@ def open_source(job: Job, notes: Notes) -> Selection:
     _settle_alpha()
     _show_in_viewports()
     if suffix != ".blend":
-        _take_camera(notes)
+        _take_camera(job, notes)
     return _select(job)
 
 
 def files_used(job: Job) -> list[str]:
     """Absolute paths of the libraries, images and other files that the open source uses."""
     files = {Path(name).resolve() for name in bpy.utils.blend_paths(absolute=True)}
+    tiled = [image for image in bpy.data.images if image.source == "TILED" and image.filepath]
+    files.update(Path(name).resolve() for image in tiled for name in _tiles(image))
     files.discard(job.source.resolve())
     return sorted(str(file) for file in files if file.is_file() and _is_allowed(file, job))
 
 
-def _take_camera(notes: Notes) -> None:
+def _tiles(image: Any) -> list[str]:
+    """Names of the files of an image of tiles, whose name has a place for their numbers."""
+    name = bpy.path.abspath(image.filepath, library=image.library)
+    numbers = [tile.number - 1001 for tile in image.tiles]
+    by_place = {number: f"u{number % 10 + 1}_v{number // 10 + 1}" for number in numbers}
+    return [name.replace("<UDIM>", str(n + 1001)).replace("<UVTILE>", by_place[n]) for n in numbers]
+
+
+def _take_camera(job: Job, notes: Notes) -> None:
     """Choose the first camera, and the frames of its animation: importers leave the scene without them."""
     scene = bpy.context.scene
     cameras = sorted((one for one in scene.objects if one.type == "CAMERA"), key=lambda one: one.name)
@@ -84,8 +93,16 @@ def _take_camera(notes: Notes) -> None:
         for other in cameras[1:]:
             what = f"the file has several cameras, of which {cameras[0].name} is used"
             notes.add("not-carried", other.name, "", what, "choose this one by blender.camera")
-    if scene.camera is not None:
-        _take_frames(scene)
+    if scene.camera is None:
+        return
+    _take_frames(scene)
+    if not job.size:
+        width, height = scene.render.resolution_x, scene.render.resolution_y
+        what, effect = "the file has no size of frames", f"they have {width}x{height} pixels: choose a --size"
+        notes.add("approximated", scene.camera.name, "Resolution", what, effect)
+    if job.source.suffix.lower() not in HAVE_RATE:
+        what, effect = "the file has no frame rate", f"it is {scene.render.fps} a second: choose --fps"
+        notes.add("approximated", scene.camera.name, "Frame Rate", what, effect)
 
 
 def _take_frames(scene: Any) -> None:

@@ -36,6 +36,13 @@ class Selection:
         """World of the scene; None where the view layer leaves it out, as Cycles does then."""
         return self.scene.world if self.view_layer.use_sky else None
 
+    @property
+    def colour_management(self) -> tuple[Any, Any]:
+        """Settings of the view, and of the display: those of the output where it overrides the scene's."""
+        output = self.scene.render.image_settings
+        owner = output if output.color_management == "OVERRIDE" else self.scene
+        return owner.view_settings, owner.display_settings
+
     def objects(self) -> list[Any]:
         """Objects whose collections renders show, those of background scenes included."""
         layers, scene = [self.view_layer], self.scene.background_set
@@ -112,6 +119,8 @@ class Placed:
         Of the copies; empty: all have the object's.
     is_seen : bool
         Whether Blender's camera sees it.
+    has_shadow : bool
+        Whether it casts shadows in Blender.
     """
 
     name: str
@@ -122,6 +131,7 @@ class Placed:
     index: int = 0
     names: tuple[str, ...] = ()
     is_seen: bool = True
+    has_shadow: bool = True
 
 
 @dataclass(eq=False)

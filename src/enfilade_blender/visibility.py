@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import bpy
 import numpy as np
@@ -11,6 +12,7 @@ from mathutils import Vector
 
 from enfilade_blender.camera import RAY_OFFSET
 from enfilade_blender.lights import Sun
+from enfilade_blender.motion import trees
 from enfilade_blender.notes import Notes
 from enfilade_blender.records import Selection, View
 
@@ -20,6 +22,9 @@ EVERY = 5  # of these rays, where there are too many objects for all
 BOXES = 800_000  # of objects that the rays of one kind of note are tested against: 1.2 s
 LISTED = 3  # objects that are named
 MINIATURE = 0.1  # scene units: Mitsuba moves the origins of rays by a thousandth of it
+MOST_LAYERS, STEP = 16, 1e-4  # of glass before the sun; scene units from one to the next
+TRANSMITTING = ("BSDF_GLASS", "BSDF_REFRACTION", "BSDF_TRANSPARENT", "BSDF_TRANSLUCENT")  # nodes
+PASSING = {"Alpha": 1.0, "Transmission Weight": 0.0}  # inputs of `Principled` that let no light pass
 FAR = 1e4  # scene units, to a point in the sun's direction
 
 
@@ -38,10 +43,36 @@ def note_sun(sun: Sun | None, views: list[View], selection: Selection, notes: No
         ((x, y, depth),) = view.pixels(eye[None] + FAR * sun.direction, selection.size)
         if depth <= 0.0 or not (0.0 <= x <= selection.size[0] and 0.0 <= y <= selection.size[1]):
             continue
-        if not selection.scene.ray_cast(graph, Vector(eye), Vector(sun.direction), distance=FAR)[0]:
+        if not _is_hidden(selection, graph, Vector(eye), Vector(sun.direction)):
             what, effect = "the camera sees the sun", "a bright shape where Cycles shows none"
             notes.add("approximated", sun.name, "Sun", what, effect)
             return
+
+
+def _is_hidden(selection: Selection, graph: Any, place: Vector, direction: Vector) -> bool:
+    """Whether the sun is hidden from a place by more than glass and cut-outs."""
+    for _ in range(MOST_LAYERS):
+        is_hit, place, _, face, obj, _ = selection.scene.ray_cast(graph, place, direction, distance=FAR)
+        if not is_hit:
+            return False
+        if not _may_transmit(obj, face):
+            return True
+        place += STEP * direction
+    return True
+
+
+def _may_transmit(obj: Any, face: int) -> bool:
+    """Whether the material of an object's face has lobes that light passes."""
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    slots = obj.material_slots
+    index = mesh.polygons[face].material_index if face < len(getattr(mesh, "polygons", ())) else 0
+    material = slots[min(index, len(slots) - 1)].material if slots else None
+    for node in (node for tree in trees(material and material.node_tree) for node in tree.nodes):
+        inputs = {name: node.inputs[name] for name in PASSING if name in node.inputs}
+        passes = (s.is_linked or abs(s.default_value - PASSING[name]) > 0.0 for name, s in inputs.items())
+        if node.type in TRANSMITTING or (node.type == "BSDF_PRINCIPLED" and any(passes)):
+            return True
+    return False
 
 
 def note_depths(views: list[View], selection: Selection, notes: Notes, *, casts: int) -> None:

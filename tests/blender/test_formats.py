@@ -4,6 +4,8 @@ import json
 
 import pytest
 
+from enfilade.camera import load_path
+
 pytestmark = [pytest.mark.blender, pytest.mark.slow]
 EXPORT = """
 import sys, bpy
@@ -69,6 +71,9 @@ def test_the_first_camera_and_its_frames_are_used(imported, suffix):
     assert result["camera"] == "Camera"
     first, last = result["frames"]
     assert last - first == 6
+    nodes = {note["node"] for note in result["notes"] if note["object"] == "Camera"}
+    assert nodes >= {"Resolution"}
+    assert ("Frame Rate" in nodes) == (suffix == ".glb")
     assert (out / "camera_path.json").is_file()
 
 
@@ -81,6 +86,45 @@ def test_the_frames_are_those_of_the_cameras_parents(blender):
         _, out, _ = blender.job(file, f"scene {file.name}")
         counts.append(len(json.loads((out / "camera_path.json").read_text())["camera_path"]))
     assert counts == [1, 7, 250]  # USD has the range of the scene
+
+
+STAGE = """#usda 1.0
+(
+    metersPerUnit = 0.01
+    timeCodesPerSecond = 30
+    upAxis = "Z"
+)
+def Camera "Eye"
+{
+    double3 xformOp:translate = (0, 0, 500)
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+}
+"""
+
+
+def test_rate_and_units_of_usd_are_those_of_the_stage(blender):
+    file = blender.folder / "stage.usda"
+    proxy = 'def Mesh "Proxy" ' + SQUARE.format("none").replace("{", '{ uniform token purpose = "proxy"', 1)
+    file.write_text(STAGE + 'def Mesh "Square"' + SQUARE.format("none") + proxy)
+    code, out, result = blender.job(file, "stage")
+    assert (code, result["fps"], result["counts"]["objects"]) == (0, 30.0, 1)
+    path = load_path(out / "camera_path.json", size=None, frames=None, fps=None)
+    assert path.fps == 30.0
+    assert path.cameras[0].world_from_camera[:3, 3] == pytest.approx([0.0, 0.0, 5.0])
+    noted = [(note["node"], note["effect"]) for note in result["notes"] if note["object"] == "Eye"]
+    assert noted == [("Resolution", "they have 1920x1080 pixels: choose a --size")]
+
+
+def test_images_within_gltf_are_copied(blender):
+    file, picture = blender.folder / "packed.glb", blender.folder / "packed.png"
+    script = TEXTURED.replace("GLTF_SEPARATE", "GLB").replace(", export_keep_originals=True", "")
+    metal = 'bsdf.inputs["Metallic"].default_value = 1.0\nbpy.ops.export_scene'  # else it is scaled
+    done = blender.run("-c", script.replace("bpy.ops.export_scene", metal), file, picture)
+    assert done.returncode == 0, done.stderr[-2000:]
+    _, out, result = blender.job(file, "packed", size=[64, 48])
+    (texture,) = out.glob("textures/*.png")
+    assert texture.read_bytes() in file.read_bytes()
+    assert not [note for note in result["notes"] if note["node"] == "Resolution"]
 
 
 @pytest.mark.parametrize(("scheme", "count"), [("none", 2), ("catmullClark", 2 * 4**2)])

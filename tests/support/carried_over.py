@@ -30,6 +30,7 @@ PRINCIPLED = (
         "mapped",
         "GGX, alpha its square; with multiple scattering if Multiscatter, but for textured metals and glass",
     ),
+    ("Roughness of 0.55 to 0.8 without Metallic", "approximated", "as of 0.55: highlights are smaller"),
     (
         "Roughness of 0.8 and more without Metallic",
         "mapped",
@@ -130,7 +131,7 @@ INPUTS = (
         "approximated",
         "the other shader, for all rays",
     ),
-    ("Missing image, or first frame of an image sequence", "approximated", "a mid grey"),
+    ("Missing image, or missing first frame of an image sequence", "approximated", "a mid grey"),
 )
 LIGHTS = (
     ("Point", "mapped", "`sphere` of its radius, not seen by the camera; `point` for radius 0"),
@@ -210,6 +211,7 @@ OBJECTS = (
         "approximated",
         "lamps: the camera does not see them; they cast no shadows",
     ),
+    ("Clear glass without a shadow", "approximated", "a thin pane, unless it is a thick object"),
     (
         "Other ray visibility of meshes, shadow catcher, holdout, indirect only",
         "not carried",
@@ -232,7 +234,7 @@ OBJECTS = (
         "not carried",
         "all light counts",
     ),
-    ("Compositor, sequencer, Freestyle", "not carried", "left out"),
+    ("Compositor, sequencer, Freestyle, burnt-in metadata", "not carried", "left out"),
     (
         "Overrides and filter of the view layer, further view layers, render region, stereoscopy",
         "not carried",

@@ -109,6 +109,9 @@ def plastic_bsdf(base: Value, roughness: Value, ior: float, context: Context) ->
 def _plastic_of(base: Value, roughness: float, ior: float, context: Context) -> Element:
     roughness = clipped(roughness)
     alpha = min(roughness, ROUGHEST_PLASTIC) ** 2
+    if ROUGHEST_PLASTIC < roughness < MATT:
+        what = f"reflections of roughness {ROUGHEST_PLASTIC} to {MATT} are those of {ROUGHEST_PLASTIC}"
+        context.notes.add("approximated", context.owner, "Roughness", what, "highlights are smaller")
     if roughness >= MATT:
         reflected = ggx.mean_reflectance(round(roughness**2, 3), round(ior, 3))
         return plugin("bsdf", "diffuse", reflectance=context.textures.lightened(base, reflected))

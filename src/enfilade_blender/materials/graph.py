@@ -258,7 +258,7 @@ class Graph:
         if is_second_clear and _is_of_shadow_rays(outputs):
             if isinstance(seen, Mix) and seen.fresnel_ior is not None and _is_clear(seen.first):
                 return seen  # thin glass, which shadow rays pass
-            if (pane := _pane(seen, mix.name)) is not None:
+            if (pane := as_pane(seen, mix.name)) is not None:
                 return pane
         what = "a surface that is transparent for some rays is so for none"
         effect = "the surface is seen, lights and casts shadows for all rays"
@@ -311,7 +311,7 @@ def _is_of_shadow_rays(outputs: list[Output]) -> bool:
     return "Is Shadow Ray" in kinds and "Is Camera Ray" not in kinds and are_sums
 
 
-def _pane(glass: Shader, node: str) -> Mix | None:
+def as_pane(glass: Shader, node: str) -> Mix | None:
     """Clear glass as thin glass; None of other shaders."""
     if isinstance(glass, Mix) and glass.fresnel_ior is not None and isinstance(glass.first, Lobe):
         glass = replace(

@@ -12,7 +12,7 @@ from enfilade_blender.job import Job
 from enfilade_blender.materials.atlas import share_bsdfs
 from enfilade_blender.materials.bake import Bakery
 from enfilade_blender.materials.bsdfs import Context
-from enfilade_blender.materials.graph import Graph
+from enfilade_blender.materials.graph import Graph, as_pane
 from enfilade_blender.materials.links import is_of_object
 from enfilade_blender.materials.surfaces import Surface, build
 from enfilade_blender.materials.textures import Textures
@@ -141,8 +141,10 @@ class MaterialLibrary:
             All objects with its mesh: linked duplicates share what is baked.
         """
         placed, shader = part.placed, self.shader(part.material)
+        if not placed.has_shadow:
+            shader = self._without_shadow(shader, placed)
         twins = [placed] if is_of_object(shader) else twins
-        key = id(placed.mesh), part.slot, part.material
+        key = id(placed.mesh), part.slot, part.material, placed.has_shadow
         if len(twins) > 1 and key in self._resolved:
             return self._resolved[key]
         copies = [matrix for twin in twins for matrix in twin.matrices]
@@ -152,13 +154,26 @@ class MaterialLibrary:
             self._resolved[key] = resolved
         return resolved
 
+    def _without_shadow(self, shader: Shader, placed: Placed) -> Shader:
+        """The shader of an object that casts no shadow: clear glass is a pane, which light passes."""
+        pane = as_pane(shader, "Ray visibility")
+        if pane is None:
+            what, effect = "hidden from shadow rays in Blender", "it casts shadows"
+            self._notes.add("not-carried", placed.name, "Ray visibility", what, effect)
+            return shader
+        what, effect = "glass without a shadow is a thin pane", "nothing is bent; thick objects cast shadows"
+        self._notes.add("approximated", placed.name, "Ray visibility", what, effect)
+        return pane
+
     def surface(self, of: PartMaterial, *, is_mirrored: bool = False) -> tuple[str, Surface]:
         """Id of a BSDF, and its surface; `is_mirrored` as its normal maps."""
         material, part = of.part.material, of.part.name
         owner = of.part if of.is_own else None
         density = _uv_density(of)
         is_solid = has_panes(of.shader) and _is_solid(of.part)
-        key = material.name_full if material else "", is_mirrored, of.is_back_seen, owner, density, is_solid
+        name = material.name_full if material else ""
+        has_shadow = of.part.placed.has_shadow
+        key = name, is_mirrored, of.is_back_seen, owner, density, is_solid, has_shadow
         if key in self._surfaces:
             return self._surfaces[key]
         context = Context(

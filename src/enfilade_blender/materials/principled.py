@@ -93,7 +93,7 @@ def _note_principled(shader: Principled, context: Context) -> None:
         note("not-carried", "Specular Tint", what, "reflections have the colour of the light")
     if not is_zero(shader["Coat Weight"]) and min(context.textures.mean(shader["Coat Tint"])) < ALMOST:
         note("not-carried", "Coat Tint", "the tint of the coat is left out", "what lies below is brighter")
-    for name in ("IOR", "Specular IOR Level"):
+    for name in ("IOR", "Specular IOR Level", "Coat IOR"):
         if not isinstance(shader[name], Constant):
             effect = "reflections have the same strength everywhere"
             note("approximated", name, "a texture is left out", effect)

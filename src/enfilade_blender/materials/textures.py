@@ -33,12 +33,7 @@ from enfilade_blender.scene_xml import Element, Identifiers, colour, plugin
 READABLE = (".png", ".jpg", ".jpeg", ".exr", ".hdr")
 LINEAR = (".exr", ".hdr")  # of these, which Mitsuba does not decode
 JPEG = b"\xff\xd8\xff"
-SIGNATURES = (
-    b"\x89PNG",
-    JPEG,
-    b"\x76\x2f\x31\x01",
-    b"#?",
-)  # first bytes of such files
+SIGNATURES = {b"\x89PNG": ".png", JPEG: ".jpg", b"\x76\x2f\x31\x01": ".exr", b"#?": ".hdr"}  # first bytes
 CMYK_DEPTH = 32  # bits of a pixel of a JPEG file, which Mitsuba reads with 8 and 24
 WRAP = {"REPEAT": "repeat", "EXTEND": "clamp", "CLIP": "clamp", "MIRROR": "mirror"}
 FLIP = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])  # Mitsuba's first row is at v = 0
@@ -260,9 +255,7 @@ class Textures:
         import bpy
 
         source = Path(bpy.path.abspath(image.filepath, library=image.library))
-        suffix = source.suffix.lower()
-        is_encoded = suffix in LINEAR and image.colorspace_settings.name not in RAW_SPACES
-        if image.source != "FILE" or image.is_dirty or suffix not in READABLE or is_encoded:
+        if image.source != "FILE" or image.is_dirty:
             return ""
         if image.packed_file is not None:
             data = image.packed_file.data
@@ -270,8 +263,12 @@ class Textures:
             data = source.read_bytes()
         else:
             return ""
-        is_cmyk = data.startswith(JPEG) and image.depth == CMYK_DEPTH
-        if not data.startswith(SIGNATURES) or is_cmyk:
+        # Images within a .glb have no name of a file.
+        kind = next((SIGNATURES[start] for start in SIGNATURES if data.startswith(start)), "")
+        suffix = source.suffix.lower() or kind
+        is_encoded = suffix in LINEAR and image.colorspace_settings.name not in RAW_SPACES
+        is_cmyk = kind == SIGNATURES[JPEG] and image.depth == CMYK_DEPTH
+        if not kind or suffix not in READABLE or is_encoded or is_cmyk:
             return ""
         file = f"textures/{self._names.unique(file_stem(name))}{suffix}"
         (self._folder / file).write_bytes(data)

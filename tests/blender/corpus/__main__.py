@@ -8,7 +8,18 @@ from pathlib import Path
 
 sys.path[0] = str(Path(__file__).resolve().parents[1])
 
-from corpus import details, edges, flat, lights, objects, office, overlooked, pitfalls, surfaces  # noqa: E402
+from corpus import (  # noqa: E402
+    details,
+    edges,
+    flat,
+    lights,
+    objects,
+    office,
+    overlooked,
+    pitfalls,
+    production,
+    surfaces,
+)
 from corpus.stage import save  # noqa: E402
 
 
@@ -20,7 +31,7 @@ def cases(module):
 
 CASES = cases(surfaces) | cases(lights) | cases(objects)
 UNLISTED = {}  # by `--list`
-for module in (details, edges, flat, office, overlooked, pitfalls):
+for module in (details, edges, flat, office, overlooked, pitfalls, production):
     UNLISTED |= cases(module)
 
 if __name__ == "__main__":

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A file with the settings of production files: an output with a view of its own, glass without shadows."""
+
+import math
+
+import bpy
+
+from corpus.stage import fill, image, light, new_file, picture, plane, principled, shader, tiles, world
+
+
+def production(folder):
+    scene = new_file()
+    scene.frame_start, scene.frame_end = 1, 6
+    world((0.2, 0.2, 0.2))
+    _output(scene)
+    _camera_that_jumps(scene.camera)
+    _lights(scene)
+    _without_shadows()
+    _tiled(folder)
+    plane("Satin", (0.0, 2.0, 0.0), 1.0, principled("satin", Roughness=0.7))
+    plane(
+        "Lacquer",
+        (2.0, 2.0, 0.0),
+        1.0,
+        principled("lacquer", Coat_Weight=1.0, Coat_IOR=image("iors", tiles, 16)),
+    )
+
+
+def _output(scene):
+    """A view of the output, and text that is burnt into it."""
+    output = scene.render.image_settings
+    output.color_management = "OVERRIDE"
+    output.view_settings.view_transform, output.view_settings.exposure = "Filmic", 1.5
+    scene.render.use_stamp = True
+
+
+def _camera_that_jumps(camera):
+    """Looks along +y, and jumps to the side in frame 4."""
+    camera.rotation_euler = (math.pi / 2, 0.0, 0.0)
+    for frame, x in ((1, 0.0), (4, 40.0)):
+        camera.location = (x, -5.0, 1.0)
+        camera.keyframe_insert("location", frame=frame)
+    curves = getattr(camera.animation_data.action, "fcurves", None)
+    if curves is None:  # from Blender 5 on
+        curves = camera.animation_data.action.layers[0].strips[0].channelbags[0].fcurves
+    for curve in curves:
+        for key in curve.keyframe_points:
+            key.interpolation = "CONSTANT"
+
+
+def _lights(scene):
+    """A sun before the camera, behind glass; lamps that change."""
+    sun = light("SUN", "Sun", (0.0, 0.0, 5.0), 3.0, angle=0.05, use_shadow=False)
+    sun.rotation_euler = (math.radians(-84.0), 0.0, 0.0)
+    for x, name, attribute, value in (
+        (-3.0, "Shadowless", "use_shadow", False),
+        (3.0, "Dimmed", "exposure", -2.0),
+    ):
+        lamp = light("POINT", name, (x, 0.0, 3.0), 50.0).data
+        if hasattr(lamp, attribute):  # exposure is from Blender 4.5 on
+            lamp.keyframe_insert(attribute, frame=1)
+            setattr(lamp, attribute, value)
+            lamp.keyframe_insert(attribute, frame=6)
+    scene.frame_set(1)
+
+
+def _without_shadows():
+    glass = principled("glass", (1.0, 1.0, 1.0, 1), Transmission_Weight=1.0, Roughness=0.0)
+    for name, y, material in (("Window", 0.0, glass), ("Board", 1.0, principled("board"))):
+        pane = plane(name, (0.0, y, 1.0), 4.0, material)
+        pane.rotation_euler = (math.pi / 2, 0.0, 0.0)
+        pane.visible_shadow = False
+    pane.location.x = 10.0  # the board, out of the sun's way
+
+
+def _tiled(folder):
+    """An image of two tiles."""
+    material, tree, bsdf = shader("tiled", "BsdfDiffuse")
+    for number in (1001, 1002):
+        one = image(f"tile {number}", tiles, 16)
+        one.filepath_raw, one.file_format = str(folder / f"tile.{number}.png"), "PNG"
+        one.save()
+    whole = bpy.data.images.load(str(folder / "tile.1001.png"))
+    whole.source = "TILED"
+    whole.tiles.new(1002)
+    whole.filepath = str(folder / "tile.<UDIM>.png")
+    fill(tree, bsdf, {"Color": picture(tree, whole)})
+    plane("Tiled", (-2.0, 2.0, 0.0), 1.0, material)
