@@ -89,8 +89,9 @@ def test_a_check_names_the_objects_that_differ(run, shot, tmp_path):
     found = json.loads(run("import", source, "--out", out, "--overwrite", *check, "--json").stdout)
     everything = found["check"]["differences"][0]
     assert everything["brightness_percent"] > 50.0  # the sky is white, and the images were grey
-    alone = run("import", source, "--out", tmp_path / "t", "--check-frames", "12")
-    assert "--check-frames needs --check" in alone.stderr
+    for flag in ("--check-frames", "--check-spp"):
+        alone = run("import", source, "--out", tmp_path / "t", flag, "12")
+        assert f"{flag} needs --check" in alone.stderr
 
 
 def test_a_check_that_fails_keeps_the_scene_and_says_where(run, shot, tmp_path):

@@ -173,6 +173,14 @@ def test_a_display_shows_pixel_for_pixel(sequence):
     assert found.viewing.peak_cd_m2 == 200.0
 
 
+def test_a_display_may_be_named(sequence):
+    folder = sequence("a", [textured()])
+    given = [compared(folder, folder, display=of).viewing for of in ("phone", display_named("phone"))]
+    assert given[0] == given[1]
+    with pytest.raises(InputError, match="unknown display 'fridge'"):
+        compared(folder, folder, display="fridge")
+
+
 def test_what_the_metric_refuses_names_the_frame(sequence, monkeypatch):
     folder = sequence("a", [textured()])
 

@@ -1,32 +1,26 @@
-"""PNG files of runs and plans."""
+"""The PNG file of a plan."""
 
 import pytest
 
-from enfilade.errors import RunFolderError
-from enfilade.reports.plots import plot_plan, plot_run, walkthrough_figure
-from support.synthetic_runs import synthetic_plan, synthetic_run, synthetic_summary
+from enfilade.reports.charts import draw, legend, new_figure
+from enfilade.reports.panels import run_panels
+from enfilade.reports.plots import plot_plan
+from support.synthetic_runs import synthetic_plan, synthetic_summary
 
 
 @pytest.mark.parametrize(("method", "count"), [("paper", 3), ("decoupled", 2), ("reference", 2)])
-def test_every_panel_has_a_heading_a_unit_and_a_legend(method, count):
-    figure = walkthrough_figure(synthetic_summary(method=method), 10.0)
+def test_panels_of_every_method_can_be_drawn(method, count):
+    panels = run_panels(synthetic_summary(method=method), 10.0)
+    figure, axes = new_figure("walkthrough", [panel.title for panel in panels])
+    for ax, panel in zip(axes, panels, strict=True):
+        draw(ax, panel)
+        legend(ax)
     assert len(figure.axes) == count
     assert figure.axes[-1].get_xlabel() == "frame"
-    assert figure.axes[0].get_ylabel() == "deg/s"
     assert figure.axes[0].get_title(loc="left") == "(a) Image velocity"
     assert all(ax.get_legend() is not None for ax in figure.axes)
 
 
-def test_plot_run_writes_into_the_run_folder(copied):
-    files = plot_run(copied)
-    assert files == [copied / "plots" / "walkthrough.png"]
-    first = files[0].read_bytes()
-    assert first.startswith(b"\x89PNG")
-    assert plot_run(copied)[0].read_bytes() == first
-    assert plot_plan(synthetic_plan(), copied / "new" / "plan.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_before_the_first_frame_there_is_nothing_to_draw(tmp_path):
-    assert plot_run(synthetic_run(tmp_path / "run", finished=())) == []
-    with pytest.raises(RunFolderError, match="no run folder"):
-        plot_run(tmp_path)
+def test_a_plot_is_a_png_file(tmp_path):
+    file = plot_plan(synthetic_plan(), tmp_path / "new" / "plan.png")
+    assert file.read_bytes().startswith(b"\x89PNG")

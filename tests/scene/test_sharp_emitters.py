@@ -268,6 +268,8 @@ def test_a_lamp_may_have_any_texture(tmp_path):
     renderer = opened_file(write(tmp_path, placed("rectangle", "wall", (0, 0, 5), "", 4.0), lamp, sky=""))
     assert renderer.has_sharp_light()
     assert not len(renderer.photons().flux)
+    (note,) = renderer.describe().notes
+    assert "the emitter lamp has a texture that is no bitmap" in note
 
 
 def test_small_lamps_are_found_beside_instances(tmp_path):

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from enfilade.cli.group import debug_option, ending_on_sigterm
 from enfilade.cli.options import (
@@ -85,8 +86,10 @@ def command(
     """
     settings = settings_of(ctx, SECTIONS)
     check_effect(ctx, "an import", {BlenderSettings: (), LimitSettings: ()})
-    if check_frames is not None and not checking["is_checked"]:
-        raise SettingsError("--check-frames needs --check")
+    for name in ("check_frames", "check_spp"):
+        is_given = ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE
+        if is_given and not checking["is_checked"]:
+            raise SettingsError(f"--{name.replace('_', '-')} needs --check")
     blender = settings[BlenderSettings]
     from enfilade.camera import parse_frames
     from enfilade.cli.progress import watch

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 PATHS_PER_CPU_S = 0.35e6
 
 
-@click.command("render", short_help="Render a walkthrough: frames, video, and a report of the cost.")
+@click.command("render", short_help="Render a walkthrough: frames, video, and tables of the cost.")
 @job_options
 @click.option(
     "--out",
@@ -68,7 +68,7 @@ def command(
     quiet: bool,
     **inputs: Any,
 ) -> None:
-    """Render a walkthrough of SCENE into frames, a video and a report of the cost.
+    """Render a walkthrough of SCENE into frames and a video; tables show its cost.
 
     SCENE is Mitsuba 3's XML. A .blend, glTF, USD, FBX or OBJ file is imported by Blender into the run folder
     first, with its camera, exposure and view; `--set blender.camera=NAME` and the like choose from it.
@@ -126,17 +126,13 @@ def reference_forecast(job: Job) -> str:
 
 
 def show_run(folder: Path, summary: dict[str, Any], *, as_json: bool = False) -> None:
-    """Draw the plots of a finished run, and print its tables and the places of its files."""
-    from enfilade.camera import ranges
-    from enfilade.reports.plots import plot_run
-
-    plots = plot_run(folder)
+    """Print the tables of a finished run, and the places of its files."""
     if as_json:
-        extra = {"folder": str(folder), "plots": [str(plot) for plot in plots]}
-        click.echo(json.dumps({**summary, **extra}, indent=2))
+        click.echo(json.dumps({**summary, "folder": str(folder)}, indent=2))
         return
     from rich.console import Console
 
+    from enfilade.camera import ranges
     from enfilade.reports.tables import run_tables
 
     console = Console()
@@ -149,6 +145,5 @@ def show_run(folder: Path, summary: dict[str, Any], *, as_json: bool = False) ->
             f"frames {ranges(black)} are black: the camera sees no surface, is inside of one, or no light "
             "arrives there"
         )
-    files = [("video", folder / summary["video"]), *(("plot", plot) for plot in plots), ("run", folder)]
-    for name, file in files:
+    for name, file in (("video", folder / summary["video"]), ("run", folder)):
         click.echo(f"{name:7} {file}")

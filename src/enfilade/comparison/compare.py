@@ -21,7 +21,7 @@ from enfilade.metric import Aqm, Comparison, SequenceAqm
 from enfilade.monitor import Monitor
 from enfilade.records import F32
 from enfilade.settings import MetricSettings, ViewingSettings
-from enfilade.viewing import Viewing
+from enfilade.viewing import Viewing, display_named
 
 Mode: TypeAlias = Literal["modern", "paper"]
 
@@ -58,7 +58,8 @@ class CompareOptions:
     metric
         Eye movements, and the slope of masking in the paper's mode.
     display
-        Replaces `viewing`: a screen, of whose pixels each shows one of the image.
+        Replaces `viewing`: a screen, of whose pixels each shows one of the image; or its name, as of
+        ``enfilade compare --display``.
     mode
         Of the metric: ``modern`` or ``paper``.
     flow
@@ -77,11 +78,13 @@ class CompareOptions:
     ------
     SettingsError
         There is no such mode or flow.
+    InputError
+        There is no such display.
     """
 
     viewing: ViewingSettings = field(default_factory=ViewingSettings)
     metric: MetricSettings = field(default_factory=MetricSettings)
-    display: Viewing | None = None
+    display: Viewing | str | None = None
     mode: Mode = "modern"
     flow: FlowChoice = "auto"
     fps: float | None = None
@@ -93,11 +96,14 @@ class CompareOptions:
         for name, known in (("mode", get_args(Mode)), ("flow", get_args(FlowChoice))):
             if (value := getattr(self, name)) not in known:
                 raise SettingsError(f"{name} = {value!r}: choose one of {', '.join(known)}")
+        if isinstance(self.display, str):
+            display_named(self.display)
 
     def conditions(self, size: tuple[int, int], fps: float) -> Viewing:
         """Viewing conditions of an image of a size."""
-        if self.display is not None:
-            return replace(self.display, fps=fps).cropped(*size)
+        screen = display_named(self.display) if isinstance(self.display, str) else self.display
+        if screen is not None:
+            return replace(screen, fps=fps).cropped(*size)
         return self.viewing.conditions(*size, fps)
 
 

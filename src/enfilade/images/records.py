@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typing
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,6 +20,7 @@ Array = npt.NDArray[Any]
 R = TypeVar("R")
 
 WIDER = {np.dtype(np.bool_): np.uint32, np.dtype(np.uint8): np.uint32}  # types that OpenEXR does not have
+OF_IMAGES = (np.float16, np.float32, np.uint32, *WIDER)
 
 
 def write_record(stem: Path, record: Any) -> Path:
@@ -31,7 +32,7 @@ def write_record(stem: Path, record: Any) -> Path:
         File name without its suffix.
     record
         A dataclass of arrays, integers, and records of the same kind; None is left out. If all arrays are
-        images, (H, W) or (H, W, 3) of one size, the file is OpenEXR, otherwise ``.npz``.
+        images of one size, (H, W), (H, W, 2) or (H, W, 3), the file is OpenEXR, otherwise ``.npz``.
 
     Returns
     -------
@@ -44,7 +45,7 @@ def write_record(stem: Path, record: Any) -> Path:
         The file can't be written.
     """
     arrays, numbers = _flat(record)
-    if all(array.ndim in (2, 3) and 0 not in array.shape for array in arrays.values()):
+    if _are_images(arrays.values()):
         file = stem.with_name(f"{stem.name}.exr")
         layers = {name: array.astype(WIDER.get(array.dtype, array.dtype)) for name, array in arrays.items()}
         write_exr(file, layers, attributes={name: str(number) for name, number in numbers.items()})
@@ -82,6 +83,14 @@ def read_record(file: Path, kind: type[R]) -> R:
         raise ImageError(f"{file} holds no {kind.__name__}: {error}; delete it to make it again") from error
 
 
+def _are_images(arrays: Collection[Array]) -> bool:
+    """Whether arrays are images of one size and of types that OpenEXR holds, one at least."""
+    if len({array.shape[:2] for array in arrays}) != 1:
+        return False
+    are_shaped = all(0 not in a.shape and (a.ndim == 2 or a.shape[2:] in ((2,), (3,))) for a in arrays)
+    return are_shaped and all(array.dtype in OF_IMAGES for array in arrays)
+
+
 def _flat(record: Any, prefix: str = "") -> tuple[dict[str, Array], dict[str, int]]:
     """Arrays and integers of a record and those in it, by dotted names."""
     arrays: dict[str, Array] = {}
@@ -106,9 +115,12 @@ def _built(kind: type[R], values: Mapping[str, Any], prefix: str) -> R:
     for field in fields(kind):  # type: ignore[arg-type]
         name = f"{prefix}{field.name}"
         hint = _without_none(hints[field.name])
+        is_optional = hint is not hints[field.name]
         if isinstance(hint, type) and is_dataclass(hint):
             is_there = any(key.startswith(f"{name}.") for key in values)
             found[field.name] = _built(hint, values, f"{name}.") if is_there else None
+        elif is_optional and name not in values:
+            found[field.name] = None
         elif hint is int:
             found[field.name] = int(values[name])
         else:

@@ -10,7 +10,6 @@ from typing import Any
 from enfilade.reports.charts import SVG_AXES, Panel, svg
 from enfilade.reports.film import Film
 from enfilade.reports.panels import marked_keyframes, quality_panel, run_panels, time_panel
-from enfilade.reports.plots import split_percent_of
 from enfilade.reports.run import ReportedRun
 from enfilade.reports.tables import percent, psnr_text, rays_columns, seconds, time_rows, traced_columns
 from enfilade.scene.blender.imported import ImportedScene
@@ -41,7 +40,9 @@ def contents(run: ReportedRun, film: Film, reference: Mapping[str, Any] | None) 
         Summary of the reference, where it is a run.
     """
     summary = run.summary
-    panels = run_panels(summary, split_percent_of(run.identity))
+    # Above so many visible pixels a run of `paper` splits segments; other methods have no such setting.
+    split_percent = run.identity["settings"].get("masks", {}).get("split_percent")
+    panels = run_panels(summary, split_percent)
     if film.difference is not None:
         panels.append(quality_panel(film.difference))
     charted = [panel for panel in [*panels, time_panel(run.lines, summary["rays"])] if panel.series]

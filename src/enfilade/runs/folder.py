@@ -6,7 +6,7 @@
     job.json         everything that a worker needs
     ledger.jsonl     one line for each finished task
     PASS/NNNN.exr    records of a pass, by frame number; frames/ are the delivered ones
-    clips/ video.mp4 summary.json plots/ failed/ logs/
+    clips/ video.mp4 summary.json failed/ logs/
     run.lock         the command that writes here
 """
 

@@ -64,7 +64,12 @@ def partly_sampled(merged: MergedScene) -> list[str]:
         emitter = shape.emitter()
         if emitter is None or not emitter.flags() & int(mi.EmitterFlags.SpatiallyVarying):
             continue
-        if _has_pattern(emitter):  # Mitsuba can't sample it
+        name = merged.names[source[0] - 1]
+        if _has_pattern(emitter):
+            notes.append(
+                f"the light of the emitter {name} has a texture that is no bitmap, of which Mitsuba samples "
+                "no rays: paths are not guided to what emitters light most; bake the texture to a bitmap"
+            )
             continue
 
         # Compare the light in front of the surface with what next-event estimation finds there.
@@ -83,8 +88,8 @@ def partly_sampled(merged: MergedScene) -> list[str]:
         if sampled < MIN_SAMPLED * whole:
             notes.append(
                 f"Mitsuba samples {sampled / whole:.0%} of the light of the emitter "
-                f"{merged.names[source[0] - 1]}, and what it lights is too dark: give it a UV map without "
-                "overlaps, in the unit square of its texture"
+                f"{name}, and what it lights is too dark: give it a UV map without overlaps, in the unit "
+                "square of its texture"
             )
     return notes
 
