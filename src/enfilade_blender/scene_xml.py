@@ -12,6 +12,7 @@ import numpy as np
 Element = ET.Element
 RESERVED = str.maketrans("./$", "___")  # of ids: separators of paths, and the mark of a parameter
 LAMP = "lamp"  # id of the BSDF of emitters that the camera does not see
+HIDDEN = "hidden from the camera"  # beginning of ids of BSDFs of other surfaces that it does not see
 Property = float | int | bool | str | tuple[float, float, float] | np.ndarray | Element
 
 

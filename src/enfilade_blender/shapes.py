@@ -92,36 +92,29 @@ class Shapes:
             self.triangles += len(mesh) * (1 if is_shared else len(placed.matrices))
             check_triangles(self.triangles, self._limits, placed.name)
             if is_shared:
+                material = replace(material, is_hidden=not placed.is_seen)
                 instanced += self._shapes_of(f"{name} mesh", mesh, material, None)
-                if not placed.is_seen:
-                    self._note_unseen(placed, is_lamp=False)
                 continue
             mesh = joined([mesh.transformed(matrix) for matrix in placed.matrices])
             if radiance is not None and mesh.area() == 0.0:
                 what, effect = "the emission of a surface without area is left out", "it gives no light"
                 self._notes.add("not-carried", name, "Emission", what, effect)
                 radiance = None
-            shapes = self._shapes_of(name, mesh, material, radiance)
             is_lit = radiance is not None
             has_back = is_lit and not (is_one(surface.opacity) and sides.hides_its_back(part.mesh, placed))
+            # A lamp that is not flat would shine through its near side: it is hidden as others are.
+            is_lamp = is_lit and surface.bsdf is None and (part.mesh.is_flat() or not has_back)
+            material = replace(material, is_hidden=not placed.is_seen and not is_lamp)
+            shapes = self._shapes_of(name, mesh, material, radiance)
             if has_back:
                 shapes += self._shapes_of(f"{name} back", back_of(mesh), material, radiance)
-            # One that is not flat would shine through its near side: it stays black.
-            if not placed.is_seen:
-                is_lamp = is_lit and surface.bsdf is None and (part.mesh.is_flat() or not has_back)
-                self._note_unseen(placed, is_lamp=is_lamp)
-                shapes = [_as_lamp(shape) for shape in shapes] if is_lamp else shapes
+            if is_lamp and not placed.is_seen:
+                self.has_unseen_lamps = True
+                what, effect = "a lamp that the camera does not see", "it casts no shadows"
+                self._notes.add("approximated", placed.name, "Ray visibility", what, effect)
+                shapes = [_as_lamp(shape) for shape in shapes]
             elements += shapes
         return elements + (self._instances(placed, instanced) if instanced else [])
-
-    def _note_unseen(self, placed: Placed, *, is_lamp: bool) -> None:
-        if is_lamp:
-            self.has_unseen_lamps = True
-            what, effect = "a lamp that the camera does not see", "it casts no shadows"
-            self._notes.add("approximated", placed.name, "Ray visibility", what, effect)
-            return
-        what, effect = "hidden from camera rays in Blender", "it is visible, and may hide what is behind"
-        self._notes.add("not-carried", placed.name, "Ray visibility", what, effect)
 
     def _instances(self, placed: Placed, shapes: list[Element]) -> list[Element]:
         group = named(plugin("shape", "shapegroup", *shapes), self.identifiers.unique(f"{placed.name} group"))

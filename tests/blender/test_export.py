@@ -80,6 +80,7 @@ from enfilade_blender import motion
 from enfilade_blender.notes import Notes
 scene = bpy.context.scene
 objects = {"scene": scene, "world": scene.world, "objects": lambda: list(scene.objects)}
+objects["colour_management"] = scene.view_settings, scene.display_settings
 selection = SimpleNamespace(frames=(1, 10), **objects)
 motion.check_generated = lambda *_: None
 def found():

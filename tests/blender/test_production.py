@@ -45,6 +45,16 @@ def test_glass_without_a_shadow_is_a_pane(exported):
     assert notes["Board"] == [("not-carried", "Ray visibility", "it casts shadows")]
 
 
+def test_walls_that_the_camera_does_not_see_are_marked(exported):
+    _, _, root, notes = exported
+    front, back = (bsdf_of(root, name) for name in ("Front wall", "Back wall"))
+    assert (front.get("id"), back.get("id")) == (
+        "hidden from the camera material plaster",
+        "material plaster",
+    )
+    assert "Front wall" not in notes
+
+
 def test_a_sun_behind_glass_is_noted_and_that_it_casts_shadows(exported):
     found = {node for _, node, _ in exported[3]["Sun"]}
     assert found == {"Sun", "Shadow"}

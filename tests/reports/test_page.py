@@ -170,7 +170,7 @@ def test_a_run_without_its_video_is_not_finished(tmp_path):
     """Also with that of other settings, while the new one is encoded."""
     folder = synthetic_run(tmp_path / "run")
     before = (folder / "job.json").read_text()
-    for name, other in (("codec", "ffv1"), ("quality", 20), ("look", "warm")):
+    for name, other in (("codec", "ffv1"), ("quality", 20)):
         job = json.loads(before)
         job["settings"]["video"][name] = other
         write_json(folder / "job.json", job)

@@ -178,6 +178,29 @@ def test_the_camera_does_not_see_lamps(tmp_path, is_lamp):
         assert seen.tolist() == [SurfaceClass.EMISSIVE, SurfaceClass.MIRROR]
 
 
+@pytest.mark.parametrize("light", ["", f'<emitter type="area">{rgb("radiance", 5, 5, 5)}</emitter>'])
+def test_the_camera_does_not_see_hidden_surfaces(tmp_path, light):
+    """A screen before a wall: what is behind looks as from between both, and not as without the screen."""
+
+    def opened_with(screen):
+        around = placed("rectangle", "wall", (0, 0, 0), DIFFUSE)
+        if screen:
+            inside = f'{light}<bsdf id="{screen}" type="twosided">{DIFFUSE}</bsdf>'
+            around += f"""<shape type="rectangle"><transform name="to_world"><rotate y="1" angle="180"/>
+<scale value="0.5"/><translate z="0.5"/></transform>{inside}</shape>"""
+        return opened(write(tmp_path, around, name=f"{screen[:6]}.xml"))
+
+    def seen_from(z, renderer):
+        camera = Camera(look_at((0, 0, z), (0, 0, 0)), 5.0, 4, 4)
+        return find_geometry(renderer, camera).depth.min(), traced(renderer, camera, spp=1024).color.mean()
+
+    depth, color = seen_from(3, opened_with("hidden from the camera: screen"))
+    assert depth == pytest.approx(3.0, rel=1e-3)
+    assert color == pytest.approx(seen_from(0.4, opened_with("screen"))[1], rel=0.02)
+    assert color != pytest.approx(seen_from(3, opened_with(""))[1], rel=0.2)
+    assert seen_from(3, opened_with("screen"))[0] == pytest.approx(2.5, rel=1e-3)
+
+
 def test_fog_around_the_camera_is_that_of_the_scenes_camera(tmp_path):
     fog = '<medium type="homogeneous" id="fog"><float name="sigma_t" value="0.5"/></medium>'
     around = '<bsdf type="null"/><ref name="exterior" id="fog"/>'

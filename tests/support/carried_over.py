@@ -212,6 +212,7 @@ OBJECTS = (
         "lamps: the camera does not see them; they cast no shadows",
     ),
     ("Clear glass without a shadow", "approximated", "a thin pane, unless it is a thick object"),
+    ("Other meshes that the camera does not see", "mapped", "BSDFs whose id says so; mirrors show them"),
     (
         "Other ray visibility of meshes, shadow catcher, holdout, indirect only",
         "not carried",

@@ -17,7 +17,7 @@ import numpy as np
 from enfilade_blender.image_files import F32
 from enfilade_blender.materials.textures import Textures
 from enfilade_blender.ply import map_uv
-from enfilade_blender.scene_xml import Element
+from enfilade_blender.scene_xml import HIDDEN, Element
 
 LARGEST_PX = 4096  # side of an atlas
 GUTTER_PX = 1  # around a texture, with its own outermost texels: lookups are bilinear
@@ -50,12 +50,13 @@ def share_bsdfs(
             users.setdefault(_id(reference), []).append(shape)
     glowing = {name for name, of in users.items() if any(s.find("emitter//texture") is not None for s in of)}
     packable = set(baked) - glowing
-    groups: dict[tuple[bool, str], list[Element]] = {}
+    groups: dict[tuple[bool, bool, str], list[Element]] = {}
     for bsdf in bsdfs:
-        is_baked = _id(bsdf) in packable and bool(_files(bsdf))
-        groups.setdefault((is_baked, _text_of(bsdf, with_files=not is_baked)), []).append(bsdf)
+        is_baked, is_hidden = _id(bsdf) in packable and bool(_files(bsdf)), _id(bsdf).startswith(HIDDEN)
+        key = is_baked, is_hidden, _text_of(bsdf, with_files=not is_baked)
+        groups.setdefault(key, []).append(bsdf)
     kept: list[Element] = []
-    for (is_baked, _), members in groups.items():
+    for (is_baked, *_), members in groups.items():
         is_packed = is_baked and len(members) > 1
         for sheet in _packed(members, users, textures, folder) if is_packed else [members]:
             kept.append(sheet[0])

@@ -31,7 +31,7 @@ from enfilade_blender.materials.values import (
 from enfilade_blender.notes import Notes
 from enfilade_blender.ply import Mesh
 from enfilade_blender.records import Placed, Selection, View
-from enfilade_blender.scene_xml import Element, Identifiers, named
+from enfilade_blender.scene_xml import HIDDEN, Element, Identifiers, named
 
 DEFAULT = Lobe("diffuse", Constant((0.8, 0.8, 0.8)), "no material")
 MAX_PANE_RATIO = 0.05  # of the mean thickness of a pane to the root of its area
@@ -73,6 +73,8 @@ class PartMaterial:
         UV map and colour attribute of the mesh that it reads.
     is_back_seen : bool
         Whether the back needs a BSDF of its own.
+    is_hidden : bool
+        Whether the camera does not see it.
     """
 
     shader: Shader
@@ -81,6 +83,7 @@ class PartMaterial:
     uv: str | None
     attribute: str | None
     is_back_seen: bool = False
+    is_hidden: bool = False
 
 
 class MaterialLibrary:
@@ -173,7 +176,7 @@ class MaterialLibrary:
         is_solid = has_panes(of.shader) and _is_solid(of.part)
         name = material.name_full if material else ""
         has_shadow = of.part.placed.has_shadow
-        key = name, is_mirrored, of.is_back_seen, owner, density, is_solid, has_shadow
+        key = name, is_mirrored, of.is_back_seen, of.is_hidden, owner, density, is_solid, has_shadow
         if key in self._surfaces:
             return self._surfaces[key]
         context = Context(
@@ -184,6 +187,7 @@ class MaterialLibrary:
         back = build(of.shader, replace(context, is_back=True)) if of.is_back_seen else None
         element = surface.element(context, back)
         name = f"material {material.name if material else 'no material'}"
+        name = f"{HIDDEN} {name}" if of.is_hidden else name
         identifier = self._identifiers.unique(f"{name}: {part}" if of.is_own else name)
         self._bsdfs.append(named(element, identifier))
         kinds = {nested.get("type") or "" for nested in element.iter("bsdf")}

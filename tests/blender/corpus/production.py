@@ -16,6 +16,7 @@ def production(folder):
     _camera_that_jumps(scene.camera)
     _lights(scene)
     _without_shadows()
+    _hidden()
     _tiled(folder)
     plane("Satin", (0.0, 2.0, 0.0), 1.0, principled("satin", Roughness=0.7))
     plane(
@@ -71,6 +72,13 @@ def _without_shadows():
         pane.rotation_euler = (math.pi / 2, 0.0, 0.0)
         pane.visible_shadow = False
     pane.location.x = 10.0  # the board, out of the sun's way
+
+
+def _hidden():
+    """A wall that the camera does not see, and one of the same material."""
+    plaster = principled("plaster", (0.9, 0.8, 0.7, 1))
+    for name, y in (("Front wall", 20.0), ("Back wall", 24.0)):
+        plane(name, (0.0, y, 0.0), 4.0, plaster).visible_camera = name == "Back wall"
 
 
 def _tiled(folder):

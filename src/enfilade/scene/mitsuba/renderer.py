@@ -317,7 +317,7 @@ class MitsubaRenderer:
     def _radiance(self, rays: Rays, sampler: Any) -> Any:
         """Radiance along camera rays."""
         ray = _ray(rays)
-        if self._shapes.has_lamps:
+        if self._shapes.has_hidden:
             *_, ray = self._intersect_beyond(ray, Bool(True), NULL_PATH)
         return self._sampled(self._integrator, ray, sampler)[0]
 

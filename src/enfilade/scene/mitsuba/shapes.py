@@ -15,6 +15,7 @@ from enfilade.scene.mitsuba.integrators import has_media
 from enfilade.scene.mitsuba.merge import MergedScene
 
 LAMP = "lamp"  # id of the `null` BSDF of emitters that the camera does not see, as in Blender's Cycles
+HIDDEN = "hidden from the camera"  # with this begin the ids of BSDFs of other surfaces that it does not see
 
 
 class Shapes:
@@ -29,9 +30,10 @@ class Shapes:
     names : tuple of str
         Of shapes 1, 2, ...
     may_be_null : bool
-        Whether any BSDF has null interactions, thin glass apart.
-    has_lamps : bool
-        Whether there are lamps. Camera rays pass them, but for scenes with participating media.
+        Whether camera rays pass any surface: null interactions, thin glass apart, and hidden surfaces.
+    has_hidden : bool
+        Whether there are lamps or hidden surfaces. Camera rays pass them, but for scenes with participating
+        media.
     """
 
     def __init__(self, merged: MergedScene) -> None:
@@ -50,14 +52,17 @@ class Shapes:
         is_clear = not has_media(scene)
         lamps[registry] = [is_clear and is_lamp(shape) for shape in shapes]
         self._is_lamp = lanes(lamps)
+        self._is_hidden = bsdf_table(scene, lambda bsdf: is_clear and bsdf.id().startswith(HIDDEN))
         self.names = merged.names
-        self.may_be_null = bool(dr.any(self._is_null))
-        self.has_lamps = bool(lamps.any())
+        has_hidden = bool(dr.any(self._is_hidden))
+        self.may_be_null = bool(dr.any(self._is_null)) or has_hidden
+        self.has_hidden = bool(lamps.any()) or has_hidden
 
     @property
     def state(self) -> Any:
         """Arrays that the methods read, and all BSDFs, which makes Dr.Jit consider those of no shape, too."""
-        return self._index, self._first, self._last, self._is_null, self._is_lamp, self._bsdfs
+        passed = self._is_null, self._is_lamp, self._is_hidden
+        return self._index, self._first, self._last, passed, self._bsdfs
 
     def index(self, si: Any) -> Any:
         """Index of the shape that is hit, from 1; an instance is a shape. 0 for a miss; UInt."""
@@ -77,16 +82,17 @@ class Shapes:
         return dr.select(instance != 0, instance, shape)
 
     def is_null(self, si: Any, transmittance: float) -> Any:
-        """Whether a hit is a null interaction: its surface transmits more than this share of light; Bool.
+        """Whether camera rays pass a hit: it is hidden, or transmits more than this share of light; Bool.
 
-        Of emitters only lamps are: the light of others would be lost.
+        They pass emitters that are lamps or hidden alone: the light of others would be lost.
         """
         bsdf = si.bsdf()
         number: Any = dr.reinterpret_array(mi.UInt32, bsdf)
         is_null = dr.gather(Bool, self._is_null, number, si.is_valid())
         transmitted = bsdf.eval_null_transmission(si, is_null)
         is_dark = ~si.shape.is_emitter() | self.is_lamp(si)
-        return is_null & is_dark & (mi.luminance(transmitted) > transmittance)
+        is_hidden = dr.gather(Bool, self._is_hidden, number, si.is_valid())
+        return is_hidden | (is_null & is_dark & (mi.luminance(transmitted) > transmittance))
 
 
 def is_lamp(shape: Any) -> bool:
