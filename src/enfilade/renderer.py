@@ -135,12 +135,12 @@ class ShadingPoint:
     has_specular : Bool
         Whether the BSDF has lobes other than the diffuse one.
     may_pass : Bool
-        Whether one of these is a null interaction: a cut-out, opaque in part or not at all.
+        Whether one of the specular lobes is a null interaction: a cut-out, opaque in part or not at all.
     is_coated : Bool
-        Whether the only one is a smooth coat over the diffuse lobe.
+        Whether the only specular lobe is a smooth coat over the diffuse one.
     specular_albedo : Float
-        Rough estimate of the share of light that these scatter towards the ray's origin: it sets the
-        probability of survival in Russian roulette, and changes no mean.
+        Rough estimate of the share of light that the specular lobes scatter towards the ray's origin: it
+        sets the probability of survival in Russian roulette, and changes no mean.
     bounce : Bounce or None
         The previous vertex; None for camera rays.
     native : Any
@@ -201,7 +201,7 @@ class BsdfSample:
     is_image : Bool
         Whether the lobe shows images: it is a delta lobe, or hardly wider.
     is_passed : Bool
-        Whether this is such a null interaction.
+        Whether the sample is a null interaction that shadow rays pass, too.
     is_interface : Bool
         Whether the surface bounds a refractive medium.
     is_within : Bool

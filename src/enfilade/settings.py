@@ -149,7 +149,7 @@ class TraceSettings(Section):
 
     seed: int = option(0, "Seed of all random numbers.", least=0, most=2**32 - 1)
     max_depth: int = option(
-        0, "Longest path in edges; 0 takes what the scene's integrator says.", least=0, most=1024
+        0, "Greatest path depth, in segments; 0 takes what the scene's integrator says.", least=0, most=1024
     )
 
 

@@ -15,11 +15,17 @@ from enfilade_blender.notes import Notes
 from enfilade_blender.records import Selection
 from enfilade_blender.usd import import_usd
 
+
+def _import_fbx(file: str) -> None:
+    # From Blender 5 on the importer in Python fails at lamps.
+    (bpy.ops.wm.fbx_import if bpy.app.version >= (5, 0, 0) else bpy.ops.import_scene.fbx)(filepath=file)
+
+
 IMPORTERS: dict[str, Callable[..., Any]] = {
     **dict.fromkeys(
         (".glb", ".gltf"), lambda file: bpy.ops.import_scene.gltf(filepath=file, import_pack_images=False)
     ),
-    ".fbx": lambda file: bpy.ops.import_scene.fbx(filepath=file),
+    ".fbx": _import_fbx,
     ".obj": lambda file: bpy.ops.wm.obj_import(filepath=file),
     **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), import_usd),
 }

@@ -474,7 +474,9 @@ def left_out(folder):
     fill(sky, sky.nodes["Background"], {"Strength": node_of(sky, "Math", Value=ray)})
     editor = scene.sequence_editor_create()
     strips = editor.strips if hasattr(editor, "strips") else editor.sequences  # before Blender 4.4
-    strips.new_effect(name="White", type="COLOR", channel=1, frame_start=1, frame_end=3)
+    # From Blender 5 on the end is a length.
+    last = {"length": 2} if bpy.app.version >= (5, 0, 0) else {"frame_end": 3}
+    strips.new_effect(name="White", type="COLOR", channel=1, frame_start=1, **last)
     scene.cycles.caustics_reflective, scene.cycles.sample_clamp_indirect = False, 2.0
     _torn()
     text = bpy.data.curves.new("Text", "FONT")

@@ -20,7 +20,9 @@ from enfilade.arrays import Array3f, Bool, Float, Int, UInt, UInt64, lanes, opaq
 LEVELS = 3  # sizes in which points are looked up: that of their path, twice and four times that
 SIZE_MASK, SIZE_OFFSET = 127, 32  # of a key: the exponent of the entry's size, plus the offset
 MIN_WIDTH, MAX_WIDTH = 1e-9, 2.0**90  # of paths, scene units: exponents that these bits can hold
-ORIGIN = 1.0 / 3.0  # of cells: planes at round coordinates lie inside of cells of all sizes, not between two
+ORIGIN = (
+    1.0 / 3.0
+)  # of entries: planes at round coordinates lie inside of entries of all sizes, not between two
 SEARCH_STEPS = (16, 8, 4, 2, 1)  # of a binary search in a bucket: up to 31 keys; the mean is at most one
 
 
@@ -136,7 +138,7 @@ class HashGrid:
 def entry_key(position: Any, normal: Any, shape_index: Any, width: Any, level: int, offset: Any = 0.5) -> Any:
     """Key of the entry of a point; UInt64.
 
-    57 bits of a hash of the shape index, the size, the three coordinates of the cell (32 bits each) and the
+    57 bits of a hash of the shape index, the size, the three coordinates of the entry (32 bits each) and the
     axis nearest to the normal; the lowest seven bits are the exponent of the size. Two entries of a size
     share a key with a probability of 2^-57. Among 4 million entries the probability of any collision is
     6e-5; that of a lookup that finds a wrong entry is 3e-11.
@@ -155,10 +157,10 @@ def entry_key(position: Any, normal: Any, shape_index: Any, width: Any, level: i
     # Quantize the position.
     exponent = Int(dr.floor(dr.log2(dr.clip(width, MIN_WIDTH, MAX_WIDTH)))) + level
     size = dr.exp2(Float(exponent))
-    cell = (Array3f(position) + ORIGIN) / size + (offset - 0.5)
+    entry = (Array3f(position) + ORIGIN) / size + (offset - 0.5)
 
     # Hash shape, size and direction of the normal, then the coordinates.
-    x, y, z = (UInt(Int(dr.floor(coordinate))) for coordinate in cell)
+    x, y, z = (UInt(Int(dr.floor(coordinate))) for coordinate in entry)
     key = _splitmix64(_packed(shape_index, UInt(exponent << 3) | _nearest_axis(normal)))
     key = _splitmix64(key ^ _packed(x, y))
     key = _splitmix64(key ^ UInt64(z))

@@ -30,8 +30,8 @@ class Entries:
         Of all light; then without emitters that cast sharp shadows where the scene has any.
     squares : (N,) float64
         Sums of the squared luminance of all light.
-    counts : (N,) int64 or float64
-        The latter where estimates have a weight.
+    counts : (N,) float64
+        Numbers of estimates, each times its weight.
     larger : (N, LEVELS) uint64
         Keys of the larger entries around each, each of twice the size of the one before. Points are not
         looked up in the last one.
@@ -40,7 +40,7 @@ class Entries:
     keys: npt.NDArray[np.uint64]
     sums: npt.NDArray[np.float64]
     squares: npt.NDArray[np.float64]
-    counts: npt.NDArray[np.int64] | npt.NDArray[np.float64]
+    counts: npt.NDArray[np.float64]
     larger: npt.NDArray[np.uint64]
 
     @staticmethod
@@ -74,8 +74,7 @@ class Entries:
             )
         )
         keys, *larger = (level[is_finite] for level in levels)
-        ones = np.ones(len(light), np.int64)
-        return Entries.joined([Entries(keys, light, squares, ones, np.column_stack(larger))])
+        return Entries.joined([Entries(keys, light, squares, np.ones(len(light)), np.column_stack(larger))])
 
     def weighted(self, weight: float) -> Entries:
         """The entries as if each estimate had been made so often; a fraction of few bits keeps sums exact."""
@@ -96,7 +95,7 @@ class Entries:
         empty, larger = np.zeros(0, np.uint64), np.zeros((0, LEVELS), np.uint64)
         width = max((part.sums.shape[1] for part in parts), default=3)
         parts = [part for part in parts if len(part.keys)]
-        parts = [Entries(empty, np.zeros((0, width)), np.zeros(0), np.zeros(0, np.int64), larger), *parts]
+        parts = [Entries(empty, np.zeros((0, width)), np.zeros(0), np.zeros(0), larger), *parts]
         keys, first, place = np.unique(
             np.concatenate([part.keys for part in parts]), return_index=True, return_inverse=True
         )
@@ -105,9 +104,7 @@ class Entries:
             for name in ("sums", "squares", "counts", "larger")
         )
         totals: Any = [np.bincount(place, v, len(keys)) for v in (*sums.T, squares, counts)]
-        return Entries(
-            keys, np.stack(totals[:-2], axis=1), totals[-2], totals[-1].astype(counts.dtype), larger[first]
-        )
+        return Entries(keys, np.stack(totals[:-2], axis=1), totals[-2], totals[-1], larger[first])
 
     def upload(self) -> HashGrid | None:
         """Upload the entries with enough samples; None if there are none."""

@@ -154,21 +154,23 @@ def _corrected(
     (N, 3) float32
         Of the pixels of `where`, row by row.
     """
-    few, many, is_shown = gathered.to_image(where), traced.to_image(where), where
+    gathered_image, traced_image, is_shown = gathered.to_image(where), traced.to_image(where), where
     if in_prepass:
         known, is_known = in_prepass
         is_shown = where | is_known
-        for image in (few, many):
+        for image in (gathered_image, traced_image):
             image.color[is_known] = known[is_known]
-    few = replace(few, variance=np.zeros_like(few.variance))  # so that all light that is gathered is kept
+    gathered_image = replace(
+        gathered_image, variance=np.zeros_like(gathered_image.variance)
+    )  # so that all light that is gathered is kept
     # Virtual images do not lie in the planes that their depths and normals describe.
     guide = replace(virtual, depth=np.zeros_like(virtual.depth))
     is_within = (virtual.shape_index & WITHIN) > 0
-    corrected = np.zeros_like(few.color)
+    corrected = np.zeros_like(gathered_image.color)
     for part in (is_within, ~is_within):  # apart, since the denoiser would mix them
         if (where & part).any():
             shown = is_shown & part
-            own = replace(few, color=few.color * part[..., None])
+            own = replace(gathered_image, color=gathered_image.color * part[..., None])
             clean = denoise_light(guide, own, shown, quality=quality, outlier=OUTLIER, is_excess_kept=True)
-            corrected[part] = correct_light(guide, clean, many, shown, levels=levels)[part]
+            corrected[part] = correct_light(guide, clean, traced_image, shown, levels=levels)[part]
     return corrected[where]

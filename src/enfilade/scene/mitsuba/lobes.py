@@ -38,7 +38,7 @@ from enfilade.scene.mitsuba.bsdfs import (
 )
 from enfilade.scene.mitsuba.shapes import bsdf_table, bsdfs_of_shapes, has_lobe, registry_index
 
-WHOLE = {"Principled", "PrincipledThin", "MaskBSDF", "Hair", "Measured", "PolarizedPlastic"}  # not split
+UNSPLIT = {"Principled", "PrincipledThin", "MaskBSDF", "Hair", "Measured", "PolarizedPlastic"}  # not split
 # Attributes times these: shares of the base colour that the diffuse lobe does not reflect.
 NOT_DIFFUSE = {"metallic": 1.0, "spec_trans": 1.0, "diff_trans": 0.5}
 LAMBERTIAN = {"MaskBSDF", "TwoSidedBRDF", "SmoothDiffuse"}  # of these alone: Lambertian, perhaps masked
@@ -71,7 +71,7 @@ class Lobes:
         self._diffuse, self._specular = mi.BSDFContext(), mi.BSDFContext()
         self._diffuse.type_mask = int(flags.Diffuse)
         self._specular.type_mask = int(flags.All) & ~int(flags.Diffuse)
-        self._whole = bsdf_table(scene, lambda bsdf: not classes(bsdf).isdisjoint(WHOLE))
+        self._unsplit = bsdf_table(scene, lambda bsdf: not classes(bsdf).isdisjoint(UNSPLIT))
         self._lambertian = bsdf_table(scene, lambda bsdf: classes(bsdf).issubset(LAMBERTIAN))
         self._sides = (
             bsdf_table(scene, lambda bsdf: is_diffuse_on(bsdf, flags.FrontSide)),
@@ -92,7 +92,7 @@ class Lobes:
         self._textured_metal = bsdf_table(scene, is_textured_metal)
         self.has_textured_metal = any(map(is_textured_metal, bsdfs_of_shapes(scene)))
         self.has_coats = bool(dr.any(self._coated))
-        self._has_whole = bool(dr.any(self._whole))
+        self._has_unsplit = bool(dr.any(self._unsplit))
         self._mixed = bsdf_table(scene, mixes_delta_lobes)
         self._has_mixed = bool(dr.any(self._mixed))
         self._scene = scene
@@ -109,24 +109,24 @@ class Lobes:
             self._coated,
             self._textured_metal,
         )
-        return self._whole, self._lambertian, self._sides, self._mixed, interfaces, albedos
+        return self._unsplit, self._lambertian, self._sides, self._mixed, interfaces, albedos
 
     def has_specular(self, si: Any, bsdf: Any) -> Any:
         """Whether there are specular lobes, null interactions included."""
         beyond = int(mi.BSDFFlags.All) & ~int(mi.BSDFFlags.Diffuse)
         has_specular = si.is_valid() & ((bsdf.flags() & beyond) != 0)
-        if not self._has_whole:
+        if not self._has_unsplit:
             return has_specular
         is_lambertian = _of(self._lambertian, si, bsdf)
         is_opaque = is_lambertian & (_opacity(si, bsdf, has_specular & is_lambertian) >= 1.0)
-        return (has_specular & ~is_opaque) | (_of(self._whole, si, bsdf) & ~is_lambertian)
+        return (has_specular & ~is_opaque) | (_of(self._unsplit, si, bsdf) & ~is_lambertian)
 
     def has_glossy(self, si: Any, bsdf: Any) -> Any:
         """Whether there are specular lobes other than delta lobes and null interactions."""
         is_glossy = has_lobe(bsdf.flags(), "GlossyReflection", "GlossyTransmission")
-        if not self._has_whole:
+        if not self._has_unsplit:
             return is_glossy
-        return is_glossy | (_of(self._whole, si, bsdf) & ~_of(self._lambertian, si, bsdf))
+        return is_glossy | (_of(self._unsplit, si, bsdf) & ~_of(self._lambertian, si, bsdf))
 
     def specular_albedo(self, si: Any, bsdf: Any) -> Any:
         """Albedo of the specular lobes, a mean over all points of a BSDF, by the viewer's angle; Float."""
@@ -147,9 +147,9 @@ class Lobes:
         inner.wi = dr.select(_number(base) != _number(bsdf), along_normal, si.wi)
 
         # Evaluate the diffuse component, or the reflectance where a BSDF does not tell it apart.
-        is_own = is_diffuse & _of(self._whole, si, base)
+        is_own = is_diffuse & _of(self._unsplit, si, base)
         albedo = dr.pi * base.eval(self._diffuse, inner, along_normal, is_diffuse & ~is_own)
-        if self._has_whole:
+        if self._has_unsplit:
             own = base.eval_diffuse_reflectance(inner, is_own)
             for name, scale in NOT_DIFFUSE.items():
                 has_it = is_own & base.has_attribute(name, is_own)
@@ -170,29 +170,29 @@ class Lobes:
 
     def eval_diffuse(self, si: Any, bsdf: Any, albedo: Any, wo: Any, active: Any) -> tuple[Any, Any]:
         """Diffuse lobe times cosine, and the density of :meth:`sample_diffuse`."""
-        is_whole = _of(self._whole, si, bsdf)
-        value, pdf = bsdf.eval_pdf(self._diffuse, si, wo, active & ~is_whole)
+        is_unsplit = _of(self._unsplit, si, bsdf)
+        value, pdf = bsdf.eval_pdf(self._diffuse, si, wo, active & ~is_unsplit)
         lambert, lambert_pdf = _lambert(si, wo, albedo)
-        return dr.select(is_whole, lambert, value), dr.select(is_whole, lambert_pdf, pdf)
+        return dr.select(is_unsplit, lambert, value), dr.select(is_unsplit, lambert_pdf, pdf)
 
     def sample_diffuse(
         self, si: Any, bsdf: Any, albedo: Any, sampler: Any, active: Any
     ) -> tuple[Any, Any, Any]:
         """Direction, density and weight of a sample of the diffuse lobe."""
-        is_whole = _of(self._whole, si, bsdf)
+        is_unsplit = _of(self._unsplit, si, bsdf)
         second, first = mi.Point2f(sampler.next_2d()), sampler.next_1d()
-        sample, weight = bsdf.sample(self._diffuse, si, first, second, active & ~is_whole)
+        sample, weight = bsdf.sample(self._diffuse, si, first, second, active & ~is_unsplit)
         up = _cosine_direction(si, second)
-        wo = dr.select(is_whole, up, sample.wo)
-        pdf = dr.select(is_whole, dr.abs(up.z) / dr.pi, sample.pdf)
-        return wo, pdf, dr.select(is_whole, albedo, weight)
+        wo = dr.select(is_unsplit, up, sample.wo)
+        pdf = dr.select(is_unsplit, dr.abs(up.z) / dr.pi, sample.pdf)
+        return wo, pdf, dr.select(is_unsplit, albedo, weight)
 
     def eval_specular(self, si: Any, bsdf: Any, albedo: Any, wo: Any, active: Any) -> tuple[Any, Any]:
         """Specular lobes times cosine, and the density of :meth:`sample_specular`."""
-        is_whole = _of(self._whole, si, bsdf)
-        value, pdf = bsdf.eval_pdf(self._specular, si, wo, active & ~is_whole)
-        difference, mixture_pdf = self._difference(si, bsdf, wo, albedo, active & is_whole)
-        return dr.select(is_whole, difference, value), dr.select(is_whole, mixture_pdf, pdf)
+        is_unsplit = _of(self._unsplit, si, bsdf)
+        value, pdf = bsdf.eval_pdf(self._specular, si, wo, active & ~is_unsplit)
+        difference, mixture_pdf = self._difference(si, bsdf, wo, albedo, active & is_unsplit)
+        return dr.select(is_unsplit, difference, value), dr.select(is_unsplit, mixture_pdf, pdf)
 
     def specular_tint(self, si: Any, bsdf: Any, active: Any) -> tuple[Any, Any]:
         """Approximate reflectance of the specular lobes, Color3f, and whether textures of a metal colour it.
@@ -254,42 +254,42 @@ class Lobes:
         lobe, 0..1, yields a direction of that lobe, and a weight without meaning. A branch of an interface
         has its own weight: what is reflected, or transmitted; the density remains that of both.
         """
-        is_whole = _of(self._whole, si, bsdf)
+        is_unsplit = _of(self._unsplit, si, bsdf)
         first, second = sampler.next_1d(), mi.Point2f(sampler.next_2d())
-        is_masked = is_whole & _of(self._lambertian, si, bsdf)
+        is_masked = is_unsplit & _of(self._lambertian, si, bsdf)
         share = _bsdf_share(albedo)
         by_bsdf = sampler.next_1d() < share
         if choice is not None:
-            is_last = is_whole & self.is_rough_interface(si, bsdf)  # `principled` chooses reflection last
+            is_last = is_unsplit & self.is_rough_interface(si, bsdf)  # `principled` chooses reflection last
             first, by_bsdf = dr.select(is_last, 1.0 - choice, choice), Bool(True)
         if branch is not None:
             # The first number chooses the branch: reflection at 0, but of `principled` at 1.
             is_clear, is_rough = self.is_clear(si, bsdf), self.is_rough_interface(si, bsdf)
             is_reflected = branch == int(Branch.REFLECTED)
-            is_first = is_reflected ^ is_whole
+            is_first = is_reflected ^ is_unsplit
             first = dr.select(is_clear | is_rough, dr.select(is_first, 0.0, ALMOST_ONE), first)
-        sample, weight = self._sampled(self._specular, si, bsdf, first, second, ~is_whole)
-        whole, whole_weight = self._sampled(self._all, si, bsdf, first, second, is_whole)
-        kind = dr.select(is_whole, whole.sampled_type, sample.sampled_type)
-        is_null = mi.has_flag(kind, mi.BSDFFlags.Null) & (~is_whole | by_bsdf)
-        is_delta = mi.has_flag(kind, mi.BSDFFlags.Delta) & (~is_whole | by_bsdf)  # null interactions, too
+        sample, weight = self._sampled(self._specular, si, bsdf, first, second, ~is_unsplit)
+        whole, whole_weight = self._sampled(self._all, si, bsdf, first, second, is_unsplit)
+        kind = dr.select(is_unsplit, whole.sampled_type, sample.sampled_type)
+        is_null = mi.has_flag(kind, mi.BSDFFlags.Null) & (~is_unsplit | by_bsdf)
+        is_delta = mi.has_flag(kind, mi.BSDFFlags.Delta) & (~is_unsplit | by_bsdf)  # null interactions, too
 
         # Weigh a sample of the mixture; a delta lobe only has the density of the BSDF.
         wo = dr.select(by_bsdf, whole.wo, _cosine_direction(si, second))
         is_failed = by_bsdf & (dr.max(whole_weight) == 0.0)  # such as a reflection to below the surface
-        difference, pdf = self._difference(si, bsdf, wo, albedo, is_whole & ~is_delta & ~is_failed)
+        difference, pdf = self._difference(si, bsdf, wo, albedo, is_unsplit & ~is_delta & ~is_failed)
         difference = dr.select(pdf > 0.0, difference / pdf, 0.0)
         difference = dr.select(is_delta, whole_weight * dr.rcp(share), difference)
         pdf = dr.select(is_delta, whole.pdf, pdf)
 
         # Of a masked Lambertian BSDF the null interaction alone counts: all paths pass, without chance.
-        if self._has_whole:
+        if self._has_unsplit:
             passed = bsdf.eval_null_transmission(si, is_masked)
             difference, pdf = dr.select(is_masked, passed, difference), dr.select(is_masked, 1.0, pdf)
             wo = dr.select(is_masked, -si.wi, wo)
             is_null, is_delta = is_null | is_masked, is_delta | is_masked
-        wo, weight = dr.select(is_whole, wo, sample.wo), dr.select(is_whole, difference, weight)
-        pdf = dr.select(is_whole, pdf, sample.pdf)
+        wo, weight = dr.select(is_unsplit, wo, sample.wo), dr.select(is_unsplit, difference, weight)
+        pdf = dr.select(is_unsplit, pdf, sample.pdf)
         if branch is not None:
             of_branch = self._reflectance(si, bsdf, wo)
             of_branch = dr.select(is_reflected, of_branch, 1.0 - of_branch)
@@ -336,7 +336,7 @@ class Lobes:
 
         # NumPy adds in a fixed order.
         valid = np.array(si.is_valid()) & np.isfinite(np.array(value))
-        entry, size = np.array(entry)[valid], len(self._whole) * ALBEDO_BINS
+        entry, size = np.array(entry)[valid], len(self._unsplit) * ALBEDO_BINS
         count = np.bincount(entry, minlength=size)
         total = np.bincount(entry, np.array(value)[valid], minlength=size)
         mean = np.where(count >= MIN_ALBEDO_SAMPLES, total / np.maximum(count, 1), 1.0)

@@ -66,7 +66,7 @@ class MitsubaRenderer:
     file
         A scene in Mitsuba's XML format.
     max_depth
-        Longest path, in edges; 0: that of the scene's integrator.
+        Greatest path depth, in segments; 0: that of the scene's integrator.
     paths_in_flight
         Paths traced at once.
 

@@ -47,7 +47,7 @@ class Shapes:
         self._index = lanes(np.concatenate([*merged.sources, [0]]).astype(np.uint32))  # two lanes at least
         self._first, self._last = lanes(first), lanes(np.maximum(count, 1) - np.uint32(1))
         self._bsdfs = mi.BSDFPtr([shape.bsdf() for shape in shapes])
-        self._is_null = bsdf_table(scene, is_looked_through)
+        self._is_null = bsdf_table(scene, has_null_interactions)
         lamps = np.zeros(max(registry) + 1, bool)
         is_clear = not has_media(scene)
         lamps[registry] = [is_clear and is_lamp(shape) for shape in shapes]
@@ -101,7 +101,7 @@ def is_lamp(shape: Any) -> bool:
     return bool(shape.is_emitter() and bsdf.class_name() == "Null" and bsdf.id() == LAMP)
 
 
-def is_looked_through(bsdf: Any) -> bool:
+def has_null_interactions(bsdf: Any) -> bool:
     """Whether a BSDF has null interactions: masks, and blends with a null lobe; thin glass is visible."""
     if not mi.has_flag(bsdf.flags(), mi.BSDFFlags.Null):
         return False
