@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from enfilade_blender.ies import mean_factor
 from enfilade_blender.job import Job
 from enfilade_blender.materials.bake_scene import BakeScene
 from enfilade_blender.materials.graph import Graph
@@ -58,6 +59,12 @@ class LampNodes:
         """A constant, or what nodes compute of constants; a number in place of a pattern, with a note."""
         if isinstance(value, Constant):
             return value
+        if isinstance(value, Procedural) and value.output.node.type == "TEX_IES":
+            mean = mean_factor(value.output.node)
+            if mean is not None:
+                what, effect = "its IES profile is averaged", "light is even in all directions"
+                self._notes.add("approximated", lamp.name, "Nodes", what, effect)
+                return Constant((mean,))
         if isinstance(value, Procedural) and all(
             of.node.type in COLOUR_NODES for of in upstream(value.output)
         ):

@@ -1,5 +1,6 @@
 """Settings of production files (see corpus/production.py)."""
 
+import math
 from xml.etree import ElementTree as ET
 
 import pytest
@@ -64,6 +65,14 @@ def test_lamps_that_change_are_noted(exported):
     _, result, _, notes = exported
     names = ["Shadowless", "Dimmed"] if result["blender"] >= "4.5" else ["Shadowless"]
     assert all(("not-carried", "Animation", "it stays as in frame 1") in notes[name] for name in names)
+
+
+def test_ies_profiles_have_their_mean(exported):
+    _, _, root, notes = exported
+    lamps = [e for e in root.findall("emitter[@type='point']") if e.find("point").get("y") == "8"]
+    intensity = float(lamps[0].find("rgb").get("value").split()[0])
+    assert intensity == pytest.approx(2.0 * 10.0 / (4.0 * math.pi), rel=1e-3)
+    assert notes["Downlight"] == [("approximated", "Nodes", "light is even in all directions")]
 
 
 def test_roughness_that_is_changed_is_noted(exported):

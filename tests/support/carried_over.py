@@ -115,11 +115,8 @@ INPUTS = (
         "baked",
         "each copy of an object by itself; of more than 64 copies as at the first one's place",
     ),
-    (
-        "Bevel, Pointiness and Ambient Occlusion of a slot; Bump of linked duplicates",
-        "baked",
-        "without the object's other slots; with the slopes of the first duplicate, whatever their scale",
-    ),
+    ("Bevel, Pointiness and Ambient Occlusion", "baked", "without the object's other material slots"),
+    ("Bump of linked duplicates", "baked", "with the slopes of the first one, whatever their scale"),
     ("Light Path", "approximated", "0: all rays see one material"),
     (
         "Mix of clear glass and Transparent by Is Shadow Ray, as of windows",
@@ -163,6 +160,7 @@ LIGHTS = (
         "a factor; falloff is quadratic",
     ),
     ("Point or area that the camera sees", "approximated", "a black surface that emits, and casts shadows"),
+    ("IES profiles of constant strength", "approximated", "light of the profile's mean intensity"),
     ("Area that is a portal", "mapped", "left out: it emits nothing"),
     ("Lamps and emitting meshes without area", "not carried", "they give no light"),
     ("World of one colour", "mapped", "`constant`"),

@@ -63,6 +63,19 @@ def _lights(scene):
             setattr(lamp, attribute, value)
             lamp.keyframe_insert(attribute, frame=6)
     scene.frame_set(1)
+    _profile()
+
+
+def _profile():
+    """A lamp with an IES profile, the same in all directions, which doubles its light."""
+    lamp = light("POINT", "Downlight", (0.0, 8.0, 3.0), 10.0, shadow_soft_size=0.0).data
+    lamp.use_nodes = True
+    text = bpy.data.texts.new("profile")
+    candela = 2.0 * 177.83 / (4.0 * math.pi)
+    text.write(f"IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 1 50\n0 180\n0\n{candela} {candela}\n")
+    profile = lamp.node_tree.nodes.new("ShaderNodeTexIES")
+    profile.ies = text
+    lamp.node_tree.links.new(profile.outputs[0], lamp.node_tree.nodes["Emission"].inputs["Strength"])
 
 
 def _without_shadows():
