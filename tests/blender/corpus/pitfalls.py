@@ -195,6 +195,8 @@ def _lost_in_files(folder):
     render.engine, render.resolution_x, render.resolution_y = "CYCLES", 4, 4
     bpy.data.scenes["layers"].camera = bpy.context.scene.camera
     bpy.data.scenes["layers"].cycles.samples = 1
+    if hasattr(render.image_settings, "media_type"):  # from Blender 5 on
+        render.image_settings.media_type = "MULTI_LAYER_IMAGE"
     render.image_settings.file_format = "OPEN_EXR_MULTILAYER"
     render.filepath = str(folder / "layers.exr")
     bpy.ops.render.render(write_still=True, scene="layers")
