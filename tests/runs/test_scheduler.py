@@ -211,9 +211,32 @@ class Doubled(Circular):
         return Output({0: frame, 1: frame})
 
 
+class Reserved(Circular):
+    passes = (Pass("video"), Pass("frames"))
+
+
+class Frameless(Circular):
+    passes = (Pass("light"),)
+
+    def tasks(self, _analysis):
+        yield Task("light", 0)
+
+
+class Stray(Circular):
+    def tasks(self, _analysis):
+        yield Task("frames", 0)
+        yield Task("ligth", 0)
+
+
+class Needy(Circular):
+    def tasks(self, _analysis):
+        yield Task("frames", 0, needs=(TaskId("light", 0),))
+
+
 @pytest.fixture
 def own_methods(monkeypatch):
-    kinds = {"circular": Circular, "hasty": Hasty, "doubled": Doubled}
+    own = (Circular, Hasty, Doubled, Reserved, Frameless, Stray, Needy)
+    kinds = {kind.__name__.lower(): kind for kind in own}
     monkeypatch.setattr("enfilade.runs.job.open_method", lambda name: kinds[name]())
 
 
@@ -227,6 +250,21 @@ def test_defects_of_a_method_are_said(tmp_path):
         EnfiladeError, match="frames 1: finished 3 times, and not done yet; several tasks write"
     ):
         render(toy_job(tmp_path, 2, method="doubled"), tmp_path / "doubled", Recorder())
+
+
+@pytest.mark.usefixtures("own_methods")
+@pytest.mark.parametrize(
+    ("name", "problem"),
+    [
+        ("reserved", "the name of the pass video is that of a pass of every run"),
+        ("frameless", "it has no task of the pass frames"),
+        ("stray", "its task ligth 0 is of none of its passes"),
+        ("needy", "its task frames 0 needs light 0, no task"),
+    ],
+)
+def test_tasks_that_contradict_the_passes_of_a_method_are_refused(tmp_path, name, problem):
+    with pytest.raises(EnfiladeError, match=f"--method {name}: {problem}"):
+        render(toy_job(tmp_path, 2, method=name), tmp_path / name, Recorder())
 
 
 def test_long_lists_of_tasks_are_shortened():

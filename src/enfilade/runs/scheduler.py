@@ -40,11 +40,37 @@ def passes_of(job: Job) -> list[Pass]:
 
 
 def tasks_of(job: Job, run: RunFolder) -> list[Task]:
-    """All tasks of a run; before its path is analyzed, those of the analysis alone."""
+    """All tasks of a run; before its path is analyzed, those of the analysis alone.
+
+    Raises
+    ------
+    EnfiladeError
+        The method's passes and tasks contradict each other.
+    """
     analysis = analysis_tasks(len(job.path))
     if not all(is_done(job, run, task) for task in analysis):
         return analysis
-    return [*analysis, *job.opened_method().tasks(analysis_of(job, run)), *video_tasks(len(job.path))]
+    method = job.opened_method()
+    tasks = list(method.tasks(analysis_of(job, run)))
+    if problem := _contradiction(method.passes, tasks):
+        raise EnfiladeError(f"--method {job.method}: {problem}")
+    return [*analysis, *tasks, *video_tasks(len(job.path))]
+
+
+def _contradiction(passes: Iterable[Pass], tasks: Sequence[Task]) -> str:
+    """What is wrong with a method's passes and tasks; empty if nothing is."""
+    names, known = {of.name for of in passes}, {task.id for task in tasks}
+    if reserved := names & {ANALYSIS.name, *VIDEO_PASSES}:
+        return f"the name of the pass {min(reserved)} is that of a pass of every run; choose another"
+    if FRAMES not in {task.pass_name for task in tasks}:
+        return f"it has no task of the pass {FRAMES}, which delivers frames"
+    for task in tasks:
+        if task.pass_name not in names:
+            return f"its task {task.pass_name} {task.frame} is of none of its passes"
+        for need in task.needs:
+            if need not in known:
+                return f"its task {task.pass_name} {task.frame} needs {need.pass_name} {need.frame}, no task"
+    return ""
 
 
 def is_done(job: Job, run: RunFolder, task: Task) -> bool:
