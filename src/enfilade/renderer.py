@@ -281,7 +281,7 @@ class Renderer(Protocol):
         ...
 
     def surfaces(self, rays: Rays) -> Surfaces:
-        """Find the first surface along each ray, beyond null interactions."""
+        """Find the first surface along each camera ray, beyond null interactions and hidden surfaces."""
         ...
 
     def trace(
@@ -366,7 +366,7 @@ class LobeRenderer(Renderer, Protocol):
         ----------
         rays
         bounce
-            Previous vertex of the path; None for camera rays.
+            Previous vertex of the path; None for camera rays, which pass hidden surfaces.
         active : Bool
             Rays to trace; the others miss.
         opaque_only

@@ -3,8 +3,11 @@
 
 from __future__ import annotations
 
+import math
+from pathlib import Path
 from typing import Any
 
+import bpy
 import numpy as np
 
 from enfilade_blender.ies import mean_factor
@@ -15,6 +18,7 @@ from enfilade_blender.materials.links import upstream
 from enfilade_blender.materials.table import COLOUR_NODES
 from enfilade_blender.materials.values import Add, Constant, Emission, Mix, Nothing, Procedural, Shader, Value
 from enfilade_blender.notes import Notes
+from enfilade_blender.open_file import is_allowed
 from enfilade_blender.records import Lamp, Selection
 
 
@@ -59,12 +63,10 @@ class LampNodes:
         """A constant, or what nodes compute of constants; a number in place of a pattern, with a note."""
         if isinstance(value, Constant):
             return value
-        if isinstance(value, Procedural) and value.output.node.type == "TEX_IES":
-            mean = mean_factor(value.output.node)
-            if mean is not None:
-                what, effect = "its IES profile is averaged", "light is even in all directions"
-                self._notes.add("approximated", lamp.name, "Nodes", what, effect)
-                return Constant((mean,))
+        if (mean := self._mean_of_profile(value, lamp)) is not None:
+            what, effect = "its IES profile is averaged", "light is even in all directions"
+            self._notes.add("approximated", lamp.name, "Nodes", what, effect)
+            return Constant((mean,))
         if isinstance(value, Procedural) and all(
             of.node.type in COLOUR_NODES for of in upstream(value.output)
         ):
@@ -77,3 +79,20 @@ class LampNodes:
         what, effect = "a pattern of its nodes is left out", "light is even, and may be brighter or darker"
         self._notes.add("not-carried", lamp.name, "Nodes", what, effect)
         return Constant((instead,))
+
+    def _mean_of_profile(self, value: Value, lamp: Lamp) -> float | None:
+        """Mean factor of an IES Texture of constant strength; None of others, or if it can't be read."""
+        if not isinstance(value, Procedural) or value.output.node.type != "TEX_IES":
+            return None
+        node, data = value.output.node, lamp.data
+        strength = node.inputs["Strength"]
+        if strength.is_linked or data.type == "SUN":
+            return None
+        if node.mode == "INTERNAL":
+            text = node.ies.as_string() if node.ies else ""
+        else:
+            file = Path(bpy.path.abspath(node.filepath, library=node.id_data.library)).resolve()
+            is_there = file.is_file() and is_allowed(file, self._job)
+            text = file.read_text(errors="replace") if is_there else ""
+        factor = mean_factor(text, data.type, getattr(data, "spot_size", math.pi))
+        return None if factor is None else factor * float(strength.default_value)

@@ -48,7 +48,7 @@ def note_settings(job: Job, selection: Selection, notes: Notes) -> None:
         ("Stereoscopy", "its pair of views", "there is one, of the camera itself"): render.use_multiview,
         ("Simplify: Culling", "its culling", "objects that it removes are there"): render.use_simplify
         and (scene.cycles.use_camera_cull or scene.cycles.use_distance_cull),
-        ("Metadata", "what is burnt into the picture", "it is without text"): render.use_stamp,
+        ("Metadata", "text in the picture", "the picture is without it"): render.use_stamp,
         ("Frame Step", f"its step of {scene.frame_step}", "every frame is rendered"): scene.frame_step != 1,
     }
     for (name, what, effect), is_used in settings.items():

@@ -166,7 +166,7 @@ def emitters(lamp: Lamp, identifiers: Identifiers, notes: Notes) -> list[Element
 
 
 def _positive(lamp: Lamp, notes: Notes) -> Colour:
-    """The colour of a lamp; what is negative is 0, with a note."""
+    """The colour of a lamp; negative light is left out, with a note."""
     r, g, b = lamp_colour(lamp)
     if min(r, g, b) < 0.0:
         what, effect = "its negative light is left out", "surfaces are brighter: Blender takes light away"

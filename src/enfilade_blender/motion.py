@@ -22,8 +22,6 @@ LISTED = 20  # objects that are named
 TOLERANCE = 1e-5
 DEFORMING = ("MESH_CACHE", "MESH_SEQUENCE_CACHE", "CLOTH", "SOFT_BODY", "OCEAN", "WAVE", "FLUID", "BUILD")
 CARRYING = ("CAMERA", "EMPTY", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE")  # types without a surface
-# Beside power and colour; exposure and temperature are from Blender 4.5 on.
-LIGHT_NUMBERS = (*SIZES, "exposure", "use_temperature", "temperature", "use_shadow")
 TARGETS = ("object", "target", "origin", "mirror_object", "offset_object", "texture_coords_object")
 
 
@@ -135,8 +133,7 @@ class Motion:
                 continue
             self._shown.add(obj.name)
             if obj.type == "LIGHT":
-                numbers = (float(getattr(obj.data, name, 0.0)) for name in LIGHT_NUMBERS)
-                state["light", obj.name] = (), (obj.data.energy, *obj.data.color, *numbers)
+                state["light", obj.name] = (), _light_numbers(obj.data)
             elif obj.type not in CARRYING:
                 state["shape", obj.name] = _bounds(obj.evaluated_get(graph))
         self._is_cut |= len(graph.object_instances) > COMPARED
@@ -156,6 +153,14 @@ def trees(tree: Any) -> list[Any]:
         return []
     groups = [node.node_tree for node in tree.nodes if node.type == "GROUP" and node.node_tree]
     return [tree, *(inner for group in groups for inner in trees(group))]
+
+
+def _light_numbers(data: Any) -> tuple[float, ...]:
+    """Power, colour, size, exposure, temperature and shadow of a lamp; some are from Blender 4.5 on."""
+    sizes = (getattr(data, name, 0.0) for name in SIZES)
+    temperature = data.temperature if getattr(data, "use_temperature", False) else 0.0
+    others = getattr(data, "exposure", 0.0), temperature, float(data.use_shadow)
+    return data.energy, *data.color, *sizes, *others
 
 
 def _bounds(evaluated: Any) -> tuple[tuple[()], tuple[float, ...]]:

@@ -69,7 +69,8 @@ def open_source(job: Job, notes: Notes) -> Selection:
     _settle_alpha()
     _show_in_viewports()
     if suffix != ".blend":
-        _take_camera(job, notes)
+        _take_camera(notes)
+        _note_defaults(job, notes)
     return _select(job)
 
 
@@ -79,7 +80,7 @@ def files_used(job: Job) -> list[str]:
     tiled = [image for image in bpy.data.images if image.source == "TILED" and image.filepath]
     files.update(Path(name).resolve() for image in tiled for name in _tiles(image))
     files.discard(job.source.resolve())
-    return sorted(str(file) for file in files if file.is_file() and _is_allowed(file, job))
+    return sorted(str(file) for file in files if file.is_file() and is_allowed(file, job))
 
 
 def _tiles(image: Any) -> list[str]:
@@ -90,7 +91,7 @@ def _tiles(image: Any) -> list[str]:
     return [name.replace("<UDIM>", str(n + 1001)).replace("<UVTILE>", by_place[n]) for n in numbers]
 
 
-def _take_camera(job: Job, notes: Notes) -> None:
+def _take_camera(notes: Notes) -> None:
     """Choose the first camera, and the frames of its animation: importers leave the scene without them."""
     scene = bpy.context.scene
     cameras = sorted((one for one in scene.objects if one.type == "CAMERA"), key=lambda one: one.name)
@@ -99,16 +100,20 @@ def _take_camera(job: Job, notes: Notes) -> None:
         for other in cameras[1:]:
             what = f"the file has several cameras, of which {cameras[0].name} is used"
             notes.add("not-carried", other.name, "", what, "choose this one by blender.camera")
-    if scene.camera is None:
-        return
-    _take_frames(scene)
+    if scene.camera is not None:
+        _take_frames(scene)
+
+
+def _note_defaults(job: Job, notes: Notes) -> None:
+    """Note the size and the rate of frames where they are Blender's."""
+    render = bpy.context.scene.render
     if not job.size:
-        width, height = scene.render.resolution_x, scene.render.resolution_y
-        what, effect = "the file has no size of frames", f"they have {width}x{height} pixels: choose a --size"
-        notes.add("approximated", scene.camera.name, "Resolution", what, effect)
+        size = f"{render.resolution_x}x{render.resolution_y} pixels"
+        what, effect = "it has no size of frames", f"they have {size} unless --size says otherwise"
+        notes.add("approximated", "the file", "Resolution", what, effect)
     if job.source.suffix.lower() not in HAVE_RATE:
-        what, effect = "the file has no frame rate", f"it is {scene.render.fps} a second: choose --fps"
-        notes.add("approximated", scene.camera.name, "Frame Rate", what, effect)
+        what, effect = "it has no frame rate", f"it is {render.fps} a second unless --fps says otherwise"
+        notes.add("approximated", "the file", "Frame Rate", what, effect)
 
 
 def _take_frames(scene: Any) -> None:
@@ -139,7 +144,7 @@ def _check_is_blend(file: Path) -> None:
         )
 
 
-def _is_allowed(file: Path, job: Job) -> bool:
+def is_allowed(file: Path, job: Job) -> bool:
     """Whether a file lies in the source's folder or in an allowed one."""
     folders = [job.source.resolve().parent, *(folder.resolve() for folder in job.library_folders)]
     return any(file.is_relative_to(folder) for folder in folders)
@@ -152,7 +157,7 @@ def _detach_images(job: Job, notes: Notes) -> None:
             continue
         file = Path(bpy.path.abspath(image.filepath, library=image.library)).resolve()
         is_missing = image.source == "FILE" and not file.is_file()  # which is noted where it is used
-        if is_missing or _is_allowed(file, job):
+        if is_missing or is_allowed(file, job):
             continue
         what = f"its file {file} lies outside the allowed folders"
         notes.add("not-carried", image.name, "", what, f"the image is missing; allow {file.parent}")
@@ -196,7 +201,7 @@ def _check_libraries(job: Job) -> None:
     linked = {of.library for of in bpy.data.user_map() if not getattr(of, "is_linked_packed", False)}
     for library in (library for library in bpy.data.libraries if library in linked):
         file = Path(bpy.path.abspath(library.filepath)).resolve()
-        if not _is_allowed(file, job):
+        if not is_allowed(file, job):
             raise ExportError(
                 f"it links the library {file}, outside the allowed folders",
                 str(job.source),

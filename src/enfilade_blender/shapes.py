@@ -14,7 +14,7 @@ from enfilade_blender.job import Job
 from enfilade_blender.materials.bsdfs import is_one
 from enfilade_blender.materials.library import MaterialLibrary, Part, PartMaterial
 from enfilade_blender.materials.textures import file_stem
-from enfilade_blender.materials.values import normals_of
+from enfilade_blender.materials.values import has_panes, normals_of
 from enfilade_blender.notes import Notes, report_progress
 from enfilade_blender.ply import Mesh, joined, write_ply
 from enfilade_blender.records import Placed, Selection, View
@@ -91,6 +91,8 @@ class Shapes:
             is_shared = has_instances and radiance is None
             self.triangles += len(mesh) * (1 if is_shared else len(placed.matrices))
             check_triangles(self.triangles, self._limits, placed.name)
+            if not placed.has_shadow and not (surface.emitted and surface.bsdf is None):
+                self._note_shadow(placed, material)
             if is_shared:
                 material = replace(material, is_hidden=not placed.is_seen)
                 instanced += self._shapes_of(f"{name} mesh", mesh, material, None)
@@ -115,6 +117,18 @@ class Shapes:
                 shapes = [_as_lamp(shape) for shape in shapes]
             elements += shapes
         return elements + (self._instances(placed, instanced) if instanced else [])
+
+    def _note_shadow(self, placed: Placed, material: PartMaterial) -> None:
+        """Note that an object casts a shadow, or is thin glass, where it has no shadow in Blender."""
+        if has_panes(material.shader):
+            what, effect = (
+                "glass without a shadow is a thin pane",
+                "nothing is bent; thick objects cast shadows",
+            )
+            self._notes.add("approximated", placed.name, "Ray visibility", what, effect)
+            return
+        what, effect = "hidden from shadow rays in Blender", "it casts shadows"
+        self._notes.add("not-carried", placed.name, "Ray visibility", what, effect)
 
     def _instances(self, placed: Placed, shapes: list[Element]) -> list[Element]:
         group = named(plugin("shape", "shapegroup", *shapes), self.identifiers.unique(f"{placed.name} group"))

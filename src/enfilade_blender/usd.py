@@ -22,6 +22,8 @@ def import_usd(file: str) -> None:
     """
     known = bpy.ops.wm.usd_import.get_rna_type().properties
     rate = _time_codes_per_second(file)
+    if rate is not None and not rate > 0.0:
+        raise ExportError(f"its timeCodesPerSecond is {rate:g}", file, "give it a positive number")
     if rate is None or "apply_unit_conversion_scale" not in known:
         version = bpy.app.version_string
         what = f"Blender {version} does not read the units and the frame rate of USD"

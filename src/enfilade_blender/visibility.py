@@ -22,7 +22,7 @@ EVERY = 5  # of these rays, where there are too many objects for all
 BOXES = 800_000  # of objects that the rays of one kind of note are tested against: 1.2 s
 LISTED = 3  # objects that are named
 MINIATURE = 0.1  # scene units: Mitsuba moves the origins of rays by a thousandth of it
-MOST_LAYERS, STEP = 16, 1e-4  # of glass before the sun; scene units from one to the next
+MOST_LAYERS, STEP = 16, 1e-4  # that a ray passes; of its distance from the origin, from one to the next
 TRANSMITTING = ("BSDF_GLASS", "BSDF_REFRACTION", "BSDF_TRANSPARENT", "BSDF_TRANSLUCENT")  # nodes
 PASSING = {"Alpha": 1.0, "Transmission Weight": 0.0}  # inputs of `Principled` that let no light pass
 FAR = 1e4  # scene units, to a point in the sun's direction
@@ -43,22 +43,31 @@ def note_sun(sun: Sun | None, views: list[View], selection: Selection, notes: No
         ((x, y, depth),) = view.pixels(eye[None] + FAR * sun.direction, selection.size)
         if depth <= 0.0 or not (0.0 <= x <= selection.size[0] and 0.0 <= y <= selection.size[1]):
             continue
-        if not _is_hidden(selection, graph, Vector(eye), Vector(sun.direction)):
+        if _cast(selection, graph, eye, sun.direction, FAR, through_glass=True) is None:
             what, effect = "the camera sees the sun", "a bright shape where Cycles shows none"
             notes.add("approximated", sun.name, "Sun", what, effect)
             return
 
 
-def _is_hidden(selection: Selection, graph: Any, place: Vector, direction: Vector) -> bool:
-    """Whether the sun is hidden from a place by more than glass and cut-outs."""
+def _cast(
+    selection: Selection,
+    graph: Any,
+    eye: np.ndarray,
+    direction: np.ndarray,
+    reach: float | None = None,
+    *,
+    through_glass: bool = False,
+) -> tuple[np.ndarray, Any] | None:
+    """Place and object that the camera sees first in a direction; None if it sees none."""
+    place, reaching = Vector(eye), {} if reach is None else {"distance": reach}
     for _ in range(MOST_LAYERS):
-        is_hit, place, _, face, obj, _ = selection.scene.ray_cast(graph, place, direction, distance=FAR)
+        is_hit, place, _, face, obj, _ = selection.scene.ray_cast(graph, place, Vector(direction), **reaching)
         if not is_hit:
-            return False
-        if not _may_transmit(obj, face):
-            return True
-        place += STEP * direction
-    return True
+            return None
+        if obj.visible_camera and not (through_glass and _may_transmit(obj, face)):
+            return np.array(place), obj
+        place += STEP * max(1.0, place.length) * Vector(direction).normalized()
+    return np.array(place), obj
 
 
 def _may_transmit(obj: Any, face: int) -> bool:
@@ -69,8 +78,9 @@ def _may_transmit(obj: Any, face: int) -> bool:
     material = slots[min(index, len(slots) - 1)].material if slots else None
     for node in (node for tree in trees(material and material.node_tree) for node in tree.nodes):
         inputs = {name: node.inputs[name] for name in PASSING if name in node.inputs}
-        passes = (s.is_linked or abs(s.default_value - PASSING[name]) > 0.0 for name, s in inputs.items())
-        if node.type in TRANSMITTING or (node.type == "BSDF_PRINCIPLED" and any(passes)):
+        passes = (s.is_linked or s.default_value != PASSING[name] for name, s in inputs.items())
+        is_used = not node.mute and any(output.is_linked for output in node.outputs)
+        if is_used and (node.type in TRANSMITTING or (node.type == "BSDF_PRINCIPLED" and any(passes))):
             return True
     return False
 
@@ -88,10 +98,10 @@ def note_depths(views: list[View], selection: Selection, notes: Notes, *, casts:
         near, far = (view.projection[2, 3] / (view.projection[2, 2] + sign) for sign in (-1.0, 1.0))
         eye, depths = view.pose[:3, 3], []
         for direction in _directions(view)[::step]:  # of unit depth
-            is_hit, place, _, _, obj, _ = selection.scene.ray_cast(graph, Vector(eye), Vector(direction))
-            if not is_hit:
+            if (found := _cast(selection, graph, eye, direction)) is None:
                 continue
-            depth = np.linalg.norm(np.array(place) - eye) / np.linalg.norm(direction)
+            place, obj = found
+            depth = np.linalg.norm(place - eye) / np.linalg.norm(direction)
             depths.append(depth)
             if not near <= depth <= far:
                 setting = "Clip Start" if depth < near else "Clip End"

@@ -71,7 +71,7 @@ def test_the_first_camera_and_its_frames_are_used(imported, suffix):
     assert result["camera"] == "Camera"
     first, last = result["frames"]
     assert last - first == 6
-    nodes = {note["node"] for note in result["notes"] if note["object"] == "Camera"}
+    nodes = {note["node"] for note in result["notes"] if note["object"] == "the file"}
     assert nodes >= {"Resolution"}
     assert ("Frame Rate" in nodes) == (suffix == ".glb")
     assert (out / "camera_path.json").is_file()
@@ -111,8 +111,8 @@ def test_rate_and_units_of_usd_are_those_of_the_stage(blender):
     path = load_path(out / "camera_path.json", size=None, frames=None, fps=None)
     assert path.fps == 30.0
     assert path.cameras[0].world_from_camera[:3, 3] == pytest.approx([0.0, 0.0, 5.0])
-    noted = [(note["node"], note["effect"]) for note in result["notes"] if note["object"] == "Eye"]
-    assert noted == [("Resolution", "they have 1920x1080 pixels: choose a --size")]
+    noted = [(note["node"], note["effect"]) for note in result["notes"] if note["object"] == "the file"]
+    assert noted == [("Resolution", "they have 1920x1080 pixels unless --size says otherwise")]
 
 
 def test_images_within_gltf_are_copied(blender):

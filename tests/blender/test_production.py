@@ -29,7 +29,7 @@ def bsdf_of(root, shape):
 def test_the_view_is_that_of_the_output(exported):
     _, result, _, notes = exported
     assert (result["view"]["view_transform"], result["exposure_ev"]) == ("Filmic", 1.5)
-    assert ("not-carried", "Metadata", "it is without text") in notes["Scene"]
+    assert ("not-carried", "Metadata", "the picture is without it") in notes["Scene"]
 
 
 def test_jumps_of_a_single_camera_are_cuts(exported):

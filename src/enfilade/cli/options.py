@@ -132,7 +132,7 @@ device_option = click.option(
     help="Render on the CPU, on an NVIDIA GPU, or on the GPU where there is one.",
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-quiet_option = click.option("--quiet", is_flag=True, help="Show no progress, warnings alone.")
+quiet_option = click.option("--quiet", is_flag=True, help="Show messages alone, no progress.")
 output_options = decorated(device_option, json_option, quiet_option)
 worker_options = decorated(
     click.option(

@@ -25,7 +25,7 @@ CAUTION = 0.8  # of the bytes, since other frames may be larger than the one fro
 
 
 class Film:
-    """The encoded frames of a run, compared with a reference where there is one.
+    """The encoded frames of a run; a complete run is compared with its reference, where there is one.
 
     Pictures that take too many bytes are scaled down to 480 pixels of width, then frames are left out evenly.
 
@@ -35,8 +35,7 @@ class Film:
     view
         View transform of the video.
     references
-        None, one or two: whatever :func:`enfilade.images.open_sequence` reads, with the finished frames of
-        the run.
+        At most two: whatever :func:`enfilade.images.open_sequence` reads, with the frames of the run.
     max_bytes
         Of all pictures, as text, about.
     monitor
@@ -116,7 +115,7 @@ class Film:
         return 1 if factor >= least else math.ceil(total * least**2 / most)
 
     def _compare(self, references: Sequence[Path], kept: set[int], monitor: Monitor) -> dict[str, Any]:
-        """Compare all finished frames with the references, and add those that are kept."""
+        """Compare all frames with the references, and add those that are kept."""
         run, indices = self._run, {number: index for index, number in enumerate(self._run.numbers)}
         absolute = AbsoluteDifference()
 

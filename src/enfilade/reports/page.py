@@ -47,7 +47,7 @@ def write_report(
         The run folder.
     reference
         Another run, or a sequence, of the same frames: adds the visible difference, that of
-        :func:`enfilade.compare` with the viewing conditions of the run.
+        :func:`enfilade.compare` with the viewing conditions of the run, once all frames are finished.
     second_reference
         As of :func:`enfilade.compare`; it needs a reference.
     out

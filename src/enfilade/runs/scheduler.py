@@ -52,20 +52,20 @@ def tasks_of(job: Job, run: RunFolder) -> list[Task]:
         return analysis
     method = job.opened_method()
     tasks = list(method.tasks(analysis_of(job, run)))
-    if problem := _contradiction(method.passes, tasks):
+    if problem := _contradiction(method.passes, [*analysis, *tasks]):
         raise EnfiladeError(f"--method {job.method}: {problem}")
     return [*analysis, *tasks, *video_tasks(len(job.path))]
 
 
 def _contradiction(passes: Iterable[Pass], tasks: Sequence[Task]) -> str:
-    """What is wrong with a method's passes and tasks; empty if nothing is."""
+    """Defect of a method's passes and tasks, those of the analysis among these; empty if there is none."""
     names, known = {of.name for of in passes}, {task.id for task in tasks}
     if reserved := names & {ANALYSIS.name, *VIDEO_PASSES}:
         return f"the name of the pass {min(reserved)} is that of a pass of every run; choose another"
     if FRAMES not in {task.pass_name for task in tasks}:
         return f"it has no task of the pass {FRAMES}, which delivers frames"
     for task in tasks:
-        if task.pass_name not in names:
+        if task.pass_name not in {*names, ANALYSIS.name}:
             return f"its task {task.pass_name} {task.frame} is of none of its passes"
         for need in task.needs:
             if need not in known:

@@ -144,8 +144,8 @@ class MaterialLibrary:
             All objects with its mesh: linked duplicates share what is baked.
         """
         placed, shader = part.placed, self.shader(part.material)
-        if not placed.has_shadow:
-            shader = self._without_shadow(shader, placed)
+        if not placed.has_shadow and (pane := as_pane(shader, "Ray visibility")) is not None:
+            shader = pane
         twins = [placed] if is_of_object(shader) else twins
         key = id(placed.mesh), part.slot, part.material, placed.has_shadow
         if len(twins) > 1 and key in self._resolved:
@@ -156,17 +156,6 @@ class MaterialLibrary:
         if len(twins) > 1:
             self._resolved[key] = resolved
         return resolved
-
-    def _without_shadow(self, shader: Shader, placed: Placed) -> Shader:
-        """The shader of an object that casts no shadow: clear glass is a pane, which light passes."""
-        pane = as_pane(shader, "Ray visibility")
-        if pane is None:
-            what, effect = "hidden from shadow rays in Blender", "it casts shadows"
-            self._notes.add("not-carried", placed.name, "Ray visibility", what, effect)
-            return shader
-        what, effect = "glass without a shadow is a thin pane", "nothing is bent; thick objects cast shadows"
-        self._notes.add("approximated", placed.name, "Ray visibility", what, effect)
-        return pane
 
     def surface(self, of: PartMaterial, *, is_mirrored: bool = False) -> tuple[str, Surface]:
         """Id of a BSDF, and its surface; `is_mirrored` as its normal maps."""

@@ -38,7 +38,7 @@ def random_points(count, seed=0):
 
 
 def names_of(points, normals, size):
-    """Entries as tuples: cell, and axis of the normal with its sign."""
+    """Entries as tuples: place, and axis of the normal with its sign."""
     axis = np.abs(normals).argmax(axis=1)
     return [
         (*np.floor((p.astype(np.float32) + np.float32(ORIGIN)) / size).astype(int), a, n[a] < 0)
@@ -47,8 +47,8 @@ def names_of(points, normals, size):
 
 
 @pytest.mark.parametrize(("width", "size"), [(0.7, 0.5), (0.004, 2.0**-8), (3e-4, 2.0**-12)])
-def test_keys_are_one_to_one_with_cells_and_directions(width, size):
-    # Widths are rounded down to a power of two; the smallest cells are those of a path near the camera.
+def test_keys_are_one_to_one_with_entries_and_directions(width, size):
+    # Widths are rounded down to a power of two; the smallest entries are those of a path near the camera.
     points, normals = random_points(30_000)
     names = names_of(points, normals, size)
     found = dict(zip(names, keys(points, normals, width), strict=True))
@@ -102,12 +102,12 @@ def test_sizes_do_not_share_entries():
 
 
 def test_keys_are_spread_evenly():
-    # Neighbouring cells: each bit of the key is set in half of them, and none depends on another. The others
+    # Neighbouring entries: each bit of the key is set in half of them, and none depends on another. The others
     # are the exponent of the size.
-    cells = np.stack(np.meshgrid(*[np.arange(24.0)] * 3), -1).reshape(-1, 3) + 0.5
-    key = keys(cells, np.tile(UP, (len(cells), 1)), 1.0)
+    points = np.stack(np.meshgrid(*[np.arange(24.0)] * 3), -1).reshape(-1, 3) + 0.5
+    key = keys(points, np.tile(UP, (len(points), 1)), 1.0)
     bits = (key[:, None] >> np.arange(7, 64, dtype=np.uint64)) & np.uint64(1)
-    limit = 5.0 / np.sqrt(len(cells))  # five standard errors of 57 means, and of 1596 correlations
+    limit = 5.0 / np.sqrt(len(points))  # five standard errors of 57 means, and of 1596 correlations
     assert np.abs(2.0 * bits.mean(axis=0) - 1.0).max() < limit
     assert np.abs(np.corrcoef(bits.T) - np.eye(57)).max() < limit
 
@@ -167,8 +167,8 @@ def test_lookups_that_are_distributed_as_the_samples_find_as_much_light():
     np.testing.assert_allclose(found[0].sum(), light[is_hit, 0].sum(), rtol=1e-5)
 
 
-def seen_in_cells(light):
-    """Lookups in four neighbouring cells with 64 estimates each, (4, 64), which have one parent."""
+def seen_in_entries(light):
+    """Lookups in four neighbouring entries with 64 estimates each, (4, 64), which have one parent."""
     points = np.float32([[x, y, 0.1] for y in (0.1, 0.6) for x in (0.1, 0.6)])
     every = np.repeat(points, light.shape[1], axis=0)
     levels = keys_of_levels(every, np.tile(UP, (len(every), 1)), 0.5)
@@ -182,14 +182,14 @@ def test_lit_and_dark_entries_keep_their_own_light():
     # Dark entries have larger relative errors, one of 98 percent: they are not left out.
     light = np.random.default_rng(3).exponential(0.01, (4, 64)) + np.array([1.0, 0.0, 0.0, 0.0])[:, None]
     light[3] = np.r_[0.32, np.full(63, 1e-4)]
-    np.testing.assert_allclose(seen_in_cells(light), light.mean(axis=1), rtol=1e-5)
+    np.testing.assert_allclose(seen_in_entries(light), light.mean(axis=1), rtol=1e-5)
 
 
 def test_light_that_few_paths_find_is_shared_by_all_entries_around():
     # Eight of 512 paths find light. Entries that have it, and those that missed it by chance, have the mean.
     light = np.full((4, 128), 0.01)
     light[[0, 0, 0, 2, 2, 2, 2, 3], [5, 28, 99, 2, 49, 50, 101, 17]] = 6.0
-    np.testing.assert_allclose(seen_in_cells(light), light.mean(), rtol=1e-5)
+    np.testing.assert_allclose(seen_in_entries(light), light.mean(), rtol=1e-5)
 
 
 def test_lookup_of_points_without_an_entry_misses():
@@ -205,7 +205,7 @@ def test_moved_points_without_an_entry_use_their_own():
     below = keys(point + np.float32([0.0, 0.0, -0.1]), UP, 0.5)
     assert below != keys(point, UP, 0.5)
     at = Array3f(point.T), Array3f(UP.T), UInt(1), Float(0.5)
-    offset = Array3f(0.5, 0.5, 0.0)  # half a cell down
+    offset = Array3f(0.5, 0.5, 0.0)  # half an entry down
     light, is_found = own.upload().lookup(*at, offset)
     assert np.array(is_found).all()
     np.testing.assert_allclose(np.array(light), 1.0)
@@ -215,7 +215,7 @@ def test_moved_points_without_an_entry_use_their_own():
 
 @pytest.mark.parametrize("width", [2.0**k for k in range(-9, 3)])
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_planes_at_round_coordinates_lie_inside_of_cells(axis, width):
+def test_planes_at_round_coordinates_lie_inside_of_entries(axis, width):
     # What rays hit lies on both sides of such a plane, by rounding.
     normal = np.eye(3)[[axis]]
     for at in (-3.0, -0.5, 0.0, 0.25, 2.0):

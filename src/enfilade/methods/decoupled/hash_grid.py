@@ -20,9 +20,8 @@ from enfilade.arrays import Array3f, Bool, Float, Int, UInt, UInt64, lanes, opaq
 LEVELS = 3  # sizes in which points are looked up: that of their path, twice and four times that
 SIZE_MASK, SIZE_OFFSET = 127, 32  # of a key: the exponent of the entry's size, plus the offset
 MIN_WIDTH, MAX_WIDTH = 1e-9, 2.0**90  # of paths, scene units: exponents that these bits can hold
-ORIGIN = (
-    1.0 / 3.0
-)  # of entries: planes at round coordinates lie inside of entries of all sizes, not between two
+# Of entries: planes at round coordinates lie inside of entries of all sizes, not between two.
+ORIGIN = 1.0 / 3.0
 SEARCH_STEPS = (16, 8, 4, 2, 1)  # of a binary search in a bucket: up to 31 keys; the mean is at most one
 
 

@@ -150,10 +150,11 @@ class VirtualImages:
         )
 
         # Intersect.
-        surfaces = self._renderer.intersect(ahead.rays, ahead.bounce).surfaces
-        # What is seen through a cut-out lies farther away.
+        following = self._renderer.intersect(ahead.rays, ahead.bounce)
+        surfaces = following.surfaces
+        # Light from behind a cut-out comes from farther away.
         opaque = self._renderer.intersect(ahead.rays, opaque_only=True).surfaces
-        forms_image = opaque.distance > surfaces.distance * (1.0 + SAME_DISTANCE)
+        forms_image = following.may_pass & (opaque.distance > surfaces.distance * (1.0 + SAME_DISTANCE))
         forms_image &= surfaces.surface != int(SurfaceClass.EMISSIVE)  # mirrors show lamps
         for kind in IMAGING:
             forms_image |= surfaces.surface == int(kind)

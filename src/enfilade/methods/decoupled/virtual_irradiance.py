@@ -160,9 +160,8 @@ def _corrected(
         is_shown = where | is_known
         for image in (gathered_image, traced_image):
             image.color[is_known] = known[is_known]
-    gathered_image = replace(
-        gathered_image, variance=np.zeros_like(gathered_image.variance)
-    )  # so that all light that is gathered is kept
+    # Without variance all light that is gathered is kept.
+    gathered_image = replace(gathered_image, variance=np.zeros_like(gathered_image.variance))
     # Virtual images do not lie in the planes that their depths and normals describe.
     guide = replace(virtual, depth=np.zeros_like(virtual.depth))
     is_within = (virtual.shape_index & WITHIN) > 0

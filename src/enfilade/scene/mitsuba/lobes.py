@@ -38,7 +38,14 @@ from enfilade.scene.mitsuba.bsdfs import (
 )
 from enfilade.scene.mitsuba.shapes import bsdf_table, bsdfs_of_shapes, has_lobe, registry_index
 
-UNSPLIT = {"Principled", "PrincipledThin", "MaskBSDF", "Hair", "Measured", "PolarizedPlastic"}  # not split
+UNSPLIT = {
+    "Principled",
+    "PrincipledThin",
+    "MaskBSDF",
+    "Hair",
+    "Measured",
+    "PolarizedPlastic",
+}  # no context selects their lobes
 # Attributes times these: shares of the base colour that the diffuse lobe does not reflect.
 NOT_DIFFUSE = {"metallic": 1.0, "spec_trans": 1.0, "diff_trans": 0.5}
 LAMBERTIAN = {"MaskBSDF", "TwoSidedBRDF", "SmoothDiffuse"}  # of these alone: Lambertian, perhaps masked

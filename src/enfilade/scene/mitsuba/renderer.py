@@ -116,7 +116,7 @@ class MitsubaRenderer:
         return self._description
 
     def surfaces(self, rays: Rays) -> Surfaces:
-        """Find the first surface along each ray that is at least half opaque."""
+        """Find the first surface along each camera ray that is not hidden, and at least half opaque."""
         found: Surfaces = self._surfaces(rays)
         return found
 
@@ -195,7 +195,8 @@ class MitsubaRenderer:
     ) -> ShadingPoint:
         """Find the first surface along each ray, and its emission.
 
-        Camera rays pass null interactions. For other rays these are specular lobes, as in Mitsuba's paths.
+        Camera rays pass null interactions and hidden surfaces. For other rays the former are specular lobes,
+        as in Mitsuba's paths.
         """
         null_transmittance = None if bounce is not None else NULL_GBUFFER if opaque_only else NULL_PATH
         surfaces, si = self._intersect(rays, active, null_transmittance)
@@ -266,7 +267,7 @@ class MitsubaRenderer:
     def _intersect(
         self, rays: Rays, active: Any = True, null_transmittance: float | None = NULL_GBUFFER
     ) -> tuple[Surfaces, Any]:
-        """First surfaces along rays, and Mitsuba's interactions; beyond null interactions, if any."""
+        """First surfaces along rays, beyond those that camera rays pass, and Mitsuba's interactions."""
         direction = mi.Vector3f(rays.direction)
         length = dr.norm(direction)
         ray = mi.Ray3f(mi.Point3f(rays.origin), direction / length)
