@@ -102,8 +102,8 @@ def test_sizes_do_not_share_entries():
 
 
 def test_keys_are_spread_evenly():
-    # Neighbouring entries: each bit of the key is set in half of them, and none depends on another. The others
-    # are the exponent of the size.
+    # Neighbouring entries: each bit of the key is set in half of them, and none depends on another. The
+    # others are the exponent of the size.
     points = np.stack(np.meshgrid(*[np.arange(24.0)] * 3), -1).reshape(-1, 3) + 0.5
     key = keys(points, np.tile(UP, (len(points), 1)), 1.0)
     bits = (key[:, None] >> np.arange(7, 64, dtype=np.uint64)) & np.uint64(1)
