@@ -234,6 +234,11 @@ def test_the_sun_is_found(tmp_path, name, radius_deg):
     angle_deg = np.degrees(np.arccos(np.clip(np.array(sun.frame.n).ravel() @ SUN, -1.0, 1.0)))
     assert angle_deg < 0.1
     assert radius_deg < np.degrees(np.arctan(sun.extent[0])) < radius_deg + 0.5
+    # Elsewhere, and in no direction at all, it has no density.
+    directions = np.array([SUN, -SUN, [np.nan] * 3, [np.inf, 0.0, 0.0]], np.float32)
+    density = np.array(sun.pdf(mi.Vector3f(directions.T)))
+    assert density[0] > 0.0
+    assert density[1:].tolist() == [0.0, 0.0, 0.0]
 
 
 @pytest.mark.parametrize("aperture_deg", [0.05, 0.1, 0.2, 0.3, 1.0])

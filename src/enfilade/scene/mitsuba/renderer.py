@@ -204,7 +204,7 @@ class MitsubaRenderer:
         return ShadingPoint(
             surfaces=surfaces,
             position=Array3f(si.p),
-            emission=self._transport.emission(si, bounce),
+            emission=self._transport.emission(si, bounce, active),
             has_specular=self._lobes.has_specular(si, bsdf),
             may_pass=has_lobe(bsdf.flags(), "Null"),
             is_coated=self._lobes.is_coated(si, bsdf),

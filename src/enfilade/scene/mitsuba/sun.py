@@ -57,13 +57,16 @@ class Sun:
         return (local.z > 0.0) & (dr.abs(local.x) < limit) & (dr.abs(local.y) < limit)
 
     def pdf(self, direction: Any) -> Any:
-        """Density of :meth:`sample` in directions on the map, per steradian; Float."""
+        """Density of :meth:`sample` in directions on the map, per steradian; 0 in others; Float."""
         local = self.frame.to_local(direction)
         half = 0.5 * TEXELS
         column, row = (
             UInt(dr.clip((of / (local.z * self.extent) + 1.0) * half, 0.0, TEXELS - 1.0)) for of in local.xy
         )
-        return dr.gather(Float, self.texels.pmf, row * TEXELS + column) / self._solid_angle(local.z)
+        # Rays that are not active may have no direction: NaN becomes an index out of bounds.
+        is_inside = self.contains(direction)
+        pmf = dr.gather(Float, self.texels.pmf, row * TEXELS + column, is_inside)
+        return dr.select(is_inside, pmf / self._solid_angle(local.z), 0.0)
 
     def _solid_angle(self, cosine: Any) -> Any:
         """Of a texel at an angle to the centre; Float."""

@@ -47,7 +47,10 @@ class LightTransport:
         self.sharp_emitters = SharpEmitters(scene, shadow_rays)
 
     def emission(self, si: Any, bounce: Bounce | None, active: Any = True) -> Any:
-        """Radiance emitted along the ray by a hit, or by the environment; weighted if the ray was sampled."""
+        """Radiance emitted along the ray by a hit, or by the environment; weighted if the ray was sampled.
+
+        Rays that are not active may have no direction, for which emitters would read tables out of bounds.
+        """
         emitter = si.emitter(self._scene, active)
         emitted = emitter.eval(si, active)
         if bounce is None:
@@ -55,7 +58,7 @@ class LightTransport:
         origin = dr.zeros(mi.Interaction3f)
         origin.p = mi.Point3f(bounce.position)
         direction = mi.DirectionSample3f(self._scene, si, origin)
-        emitter_pdf = self._scene.pdf_emitter_direction(origin, direction, ~bounce.is_delta)
+        emitter_pdf = self._scene.pdf_emitter_direction(origin, direction, active & ~bounce.is_delta)
         apart = self.sharp_emitters.pdf(emitter, direction.d, emitter_pdf)
         emitter_pdf = dr.select(bounce.soft_only, apart, emitter_pdf)
         return Array3f(emitted * dr.select(bounce.is_delta, 1.0, mis_weight(bounce.pdf, emitter_pdf)))
