@@ -44,7 +44,7 @@ def test_the_settings_are_those_of_the_run(run, tmp_path):
     monitor = Recorder()
     file = encode(run, {}, monitor, file=tmp_path / "again.mkv")
     np.testing.assert_array_equal(images(file), images(run / "video.mkv"))
-    assert (open_sequence(file).fps, len(monitor.done)) == (24.0, 4)
+    assert (open_sequence(file).fps, monitor.counts) == (24.0, {"video": 4})
 
 
 def test_another_exposure_and_codec(run):

@@ -121,13 +121,13 @@ class Recorder:
     def __init__(self, after: int = 0, act: Callable[[], object] = lambda: None) -> None:
         self.said: list[str] = []
         self.done: list[str] = []
-        self._counts: dict[str, int] = {}
+        self.counts: dict[str, int] = {}
         self._after, self._act = after, act
 
     def progress(self, name: str, done: int, total: int) -> None:
         assert 0 <= done <= total
-        is_task = done > self._counts.get(name, done)  # at first the beginning of a pass is shown
-        self._counts[name] = done
+        is_task = done > self.counts.get(name, done)  # at first the beginning of a pass is shown
+        self.counts[name] = done
         if is_task:
             self.done.append(name)
         if is_task and len(self.done) == self._after:
