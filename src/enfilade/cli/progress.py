@@ -125,18 +125,10 @@ class MessageMonitor:
         self._write(text)
 
 
-class OpenJdMonitor:
-    """Progress for Open Job Description, on stdout, in percent of the present stage.
+class OpenJdMonitor(MessageMonitor):
+    """Progress for Open Job Description, on stdout, in percent of the present stage; messages as above."""
 
-    Parameters
-    ----------
-    write
-        Writes one line.
-    """
-
-    def __init__(self, write: Callable[[str], object]) -> None:
-        self._write = write
-        self._name = ""
+    _name = ""  # of the stage
 
     def progress(self, name: str, done: int, total: int) -> None:
         """Write the progress of a stage."""
@@ -144,10 +136,6 @@ class OpenJdMonitor:
             self._name = name
             self._write(f"openjd_status: {name}")
         self._write(f"openjd_progress: {100.0 * done / max(total, 1):.1f}")
-
-    def message(self, text: str) -> None:
-        """Write a line."""
-        self._write(text)
 
 
 def clock_time(seconds: float) -> str:
