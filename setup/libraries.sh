@@ -1,8 +1,8 @@
 #!/bin/sh
-# Install system libraries that no wheel contains, by apt, if they are missing: LLVM 16 or newer, and libatomic.
+# Install system libraries that no wheel contains, by apt, if they are missing: LLVM 17 or newer, and libatomic.
 # Exit status 0: both are installed. 2: one is missing, and a message says what to do.
 set -u
-LEAST=16
+LEAST=17
 NEWEST=22
 
 # File names of the libraries in the search paths of the loader and of Dr.Jit.

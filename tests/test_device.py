@@ -49,11 +49,11 @@ def pretend(monkeypatch, *, llvm, cuda=False, optix=True, version=(19, 1, 7)):
     return chosen
 
 
-@pytest.mark.parametrize("version", [(14, 0, 6), (15, 0, 7)])
+@pytest.mark.parametrize("version", [(14, 0, 6), (15, 0, 7), (16, 0, 6)])
 def test_an_old_llvm_is_refused_with_the_way_out(monkeypatch, version):
     chosen = pretend(monkeypatch, llvm=True, version=version)
     with pytest.raises(
-        DeviceError, match=rf"LLVM {'.'.join(map(str, version))} is too old, 16 is needed; .* apt-get"
+        DeviceError, match=rf"LLVM {'.'.join(map(str, version))} is too old, 17 is needed; .* apt-get"
     ):
         activate("cpu")
     assert chosen == []

@@ -15,8 +15,8 @@ from typing import Any, Literal
 
 from enfilade.errors import DeviceError
 
-LLVM_MINIMUM = 16  # 14 and 15 abort inside the compiler on some of Mitsuba's kernels
-INSTALL_LLVM = "install it with: sudo apt-get install libllvm19 (any LLVM from 16 on will do)"
+LLVM_MINIMUM = 17  # older ones abort inside the compiler: they lack "fmaximum", or fail on some kernels
+INSTALL_LLVM = "install it with: sudo apt-get install libllvm19 (any LLVM from 17 on will do)"
 INSTALL_LIBRARIES = "the library that it misses is most likely had by: sudo apt-get install libatomic1"
 
 NO_GPU = "no usable NVIDIA GPU on this machine"
