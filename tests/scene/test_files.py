@@ -2,13 +2,17 @@
 
 import errno
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from enfilade.camera.pinhole import Camera, look_at
 from enfilade.errors import SceneError
+from enfilade.renderer import Purpose, RandomKey
 from enfilade.runs.failure import Failure, FailureKind
 from enfilade.scene.mitsuba.files import check_scene, fingerprint
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
@@ -225,3 +229,45 @@ def test_the_error_of_the_operating_system_is_kept(scene, monkeypatch, number):
         MitsubaRenderer(file)
     kind = FailureKind.ERROR if number == errno.EIO else FailureKind.FATAL
     assert Failure.of(said.value).kind is kind
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        (
+            '<emitter type="point"><spectrum type="blackbody" name="intensity"/></emitter>',
+            r"scene\.xml.*: blackbody can't be rendered here; write <rgb>",
+        ),
+        ('<emitter type="timed_sunsky"/>', r"scene\.xml.*: timed_sunsky can't .* <emitter type=\"sunsky\">"),
+        (
+            '<emitter type="constant"><rgb name="radiance" value="$light"/></emitter>',
+            r'undefined parameter: \$light.*; add <default name="light" value="..."/> to it',
+        ),
+    ],
+)
+def test_what_is_refused_says_what_to_write(scene, body, words):
+    refused(scene(BALL + body), words)
+
+
+@pytest.mark.parametrize(
+    "emitter",
+    [
+        '<emitter type="directional" id="sun">{}</emitter>',
+        '<emitter type="sunsky" id="sun"><vector name="sun_direction" x="0.3" y="1" z="0.2"/>{}</emitter>',
+    ],
+)
+def test_the_scale_of_an_emitter_changes_no_light(scene, emitter):
+    def mean(transform):
+        place = f'<transform name="to_world">{transform}<rotate x="1" angle="-70"/></transform>'
+        renderer = MitsubaRenderer(scene('<shape type="sphere"/>' + emitter.format(place)))
+        camera = Camera(look_at((0, 0, 6), (0, 0, 0)), 25, 8, 8)
+        key, pixels = RandomKey(1, 0, Purpose.REFERENCE), np.arange(64, dtype=np.uint32)
+        return renderer.trace(camera, pixels, key, spp=16).color.mean(), renderer.describe().notes
+
+    plain, none = mean("")
+    scaled, notes = mean('<scale x="2" y="3" z="2"/>')
+    assert none == ()
+    assert scaled == pytest.approx(plain, rel=1e-4)
+    assert re.search(r"^\S*scene\.xml .*: the to_world of the \w+ emitter sun has a scale", notes[0])
+    with pytest.raises(SceneError, match=r"emitter sun scales by zero"):
+        mean('<scale value="0"/>')

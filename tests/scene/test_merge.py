@@ -17,6 +17,7 @@ from enfilade.scene.mitsuba.load import load_scene
 from enfilade.scene.mitsuba.merge import MergedScene, merge_meshes
 from enfilade.scene.opener import Scene
 from enfilade.settings import Settings
+from support.mitsuba_scene import placed
 
 BOX = """<shape type="cube" id="{name}"><transform name="to_world"><scale value="0.3"/>
   <rotate y="1" angle="{angle}"/><translate x="{x}" y="{y}"/></transform><ref id="{material}"/></shape>"""
@@ -249,3 +250,18 @@ def test_a_mesh_without_triangles_is_refused(tmp_path, is_instanced):
     file.write_text(f'<scene version="3.0.0">{empty}</scene>')
     with pytest.raises(SceneError, match="the mesh void has no triangles"):
         load_scene(file)
+
+
+def test_meshes_of_equal_materials_become_one_shape(tmp_path):
+    """However often the material is written; not where the id of one has a meaning."""
+    paint = '<bsdf type="twosided"><bsdf type="roughplastic"/></bsdf>'
+
+    def shapes(more=""):
+        cubes = "".join(placed("cube", f"cube {i}", (i, 0, 0), paint) for i in range(5))
+        renderer = opened(tmp_path, f'<scene version="3.0.0">{cubes}{more}<emitter type="constant"/></scene>')
+        return len(renderer._scene.shapes()), renderer.describe().shapes
+
+    assert shapes() == (1, tuple(f"cube {i}" for i in range(5)))
+    assert (
+        shapes(placed("cube", "lid", (9, 0, 0), '<bsdf type="diffuse" id="hidden from the camera"/>'))[0] == 6
+    )

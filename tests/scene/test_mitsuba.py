@@ -301,7 +301,7 @@ def test_too_little_memory_is_no_fault_of_the_scene(tmp_path, monkeypatch, error
     def scarce(*_arguments, **_options):
         raise error
 
-    monkeypatch.setattr(mi, "load_file", scarce)
+    monkeypatch.setattr(mi.parser, "instantiate", scarce)
     with pytest.raises(MemoryError):
         opened(write(tmp_path, placed("sphere", "ball", (0, 0, 0), DIFFUSE)))
 

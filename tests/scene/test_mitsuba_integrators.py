@@ -1,14 +1,18 @@
 """Integrators of Mitsuba scenes: which are accepted, and whose lobes are separable."""
 
+import drjit as dr
 import numpy as np
 import pytest
 
 from enfilade.arrays import Array3f, rows
+from enfilade.camera.pinhole import Camera, look_at
 from enfilade.errors import SceneError
-from enfilade.renderer import Rays
+from enfilade.gbuffer import find_geometry
+from enfilade.renderer import Purpose, RandomKey, Rays
 from support.mitsuba_scene import DIFFUSE, HOLES, opened, placed, veil, write_holes
 
 HIDDEN = '<integrator type="{}"><boolean name="hide_emitters" value="true"/></integrator>'
+AOVS = '<integrator type="aov"><string name="aovs" value="d:depth"/><integrator type="path"/></integrator>'
 SPOT = '<emitter type="spot"/>'
 THREE = '<integer name="max_depth" value="3"/>'
 BUMPS = HOLES.format("bumps", "bilinear")
@@ -32,7 +36,8 @@ def of_integrator(folder, integrator, inside=DIFFUSE):
         ("", DIFFUSE, ""),
         ('<integrator type="direct"/>', DIFFUSE, "DirectIntegrator, not a path tracer"),
         (f'<integrator type="path">{THREE}</integrator>', DIFFUSE, "depth 3 (--max-depth 5 or"),
-        (HIDDEN.format("path"), DIFFUSE, "hides"),
+        (HIDDEN.format("path"), DIFFUSE, ""),
+        (AOVS, DIFFUSE, ""),
         ('<integrator type="volpath"/>', f'<bsdf type="null"/>{FOG}', "participating media"),
         ('<integrator type="path"/>', f'<bsdf type="dielectric"/>{FOG}', ""),  # which it never looks at
         ('<integrator type="volpath"/>', '<bsdf type="thindielectric"/>', ""),
@@ -89,11 +94,67 @@ def test_properties_that_mitsuba_does_not_know_are_named(tmp_path):
 
 def test_a_limit_of_edges_leaves_the_integrator_what_it_is(tmp_path):
     integrator = opened(of_integrator(tmp_path, HIDDEN.format("volpath")), max_depth=7)._integrator
-    assert (integrator.class_name(), integrator.hide_emitters) == ("VolumetricPathIntegrator", True)
+    assert integrator.class_name() == "VolumetricPathIntegrator"
     assert "max_depth = 7" in str(integrator)
+    assert "max_depth = 6" in str(opened(of_integrator(tmp_path, AOVS), max_depth=6)._integrator)
     direct = of_integrator(tmp_path, '<integrator type="direct"/>')
     with pytest.raises(SceneError, match="DirectIntegrator, has no limit of the path depth: leave --max"):
         opened(direct, max_depth=7)
     for name in ("ptracer", "prb", "prbvolpath"):
         with pytest.raises(SceneError, match="can't render single pixels"):
             opened(of_integrator(tmp_path, f'<integrator type="{name}"/>'))
+
+
+def test_hidden_emitters_are_not_seen_and_give_light(tmp_path):
+    """A lamp before a wall, a mirror before the sky, and the sky."""
+    glow = '<bsdf type="diffuse"/><emitter type="area"><rgb name="radiance" value="9"/></emitter>'
+    shapes = placed("rectangle", "lamp", (0, 0, 2), glow) + placed("rectangle", "wall", (0, 0, 0), DIFFUSE)
+    shapes += placed("rectangle", "mirror", (3, 0, 0), '<bsdf type="conductor"/>')
+    sky = '<emitter type="constant"><rgb name="radiance" value="0.5"/></emitter>'
+    cameras = [Camera(look_at((x, 0, 6), (x, 0, 0)), 0.5, 4, 4) for x in (0, 3, 6)]
+    pixels = np.arange(16, dtype=np.uint32)
+
+    def found(integrator):
+        file = tmp_path / "scene.xml"
+        file.write_text(f'<scene version="3.0.0">{integrator}{shapes}{sky}</scene>')
+        renderer, key = opened(file), RandomKey(1, 0, Purpose.REFERENCE)
+        names = ("", *renderer.describe().shapes)
+        seen = {names[index] for c in cameras for index in find_geometry(renderer, c).shape_index.flat}
+        traced = [renderer.trace(camera, pixels, key, spp=64).color.mean() for camera in cameras]
+        rays = Rays(Array3f([0, 3, 6], 0, 6), Array3f(0, 0, -1) + dr.zeros(Array3f, 3))
+        emitted = rows(renderer.intersect(rays).emission).mean(axis=1)
+        return renderer.describe().has_background, seen, traced, emitted.tolist()
+
+    has_background, seen, traced, emitted = found('<integrator type="path"/>')
+    assert (has_background, seen) == (True, {"lamp", "mirror", ""})
+    assert traced == pytest.approx([9.25, 0.48, 0.5], abs=0.03)
+    assert emitted == pytest.approx([9.0, 0.0, 0.5])
+    has_background, seen, traced, emitted = found(HIDDEN.format("path"))
+    assert (has_background, seen) == (False, {"wall", "mirror", ""})
+    assert 0.05 < traced[0] < 1.0  # of the wall, lit by the lamp
+    assert traced[1:] == pytest.approx([0.48, 0.0], abs=0.03)
+    assert emitted == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        ("{0}", ""),
+        (
+            '<shape type="sphere"><transform name="to_world"><translate x="20000"/></transform></shape>',
+            "1.8 units",
+        ),
+        ('<shape type="sphere"><float name="radius" value="0.01"/></shape>', "measures 0.0346: shadows"),
+        ('<shape type="sphere"><bsdf type="polarizer"/></shape>', "no polarization here"),
+        (
+            f'<integrator type="volpath"/><shape type="sphere"><bsdf type="null"/>{FOG}</shape>',
+            "taken to be in",
+        ),
+    ],
+)
+def test_what_frames_do_not_show_right_is_noted(tmp_path, body, words):
+    file = tmp_path / "scene.xml"
+    inside = body.format(placed("sphere", "ball", (0, 0, 0), DIFFUSE))
+    file.write_text(f'<scene version="3.0.0">{inside}<emitter type="constant"/></scene>')
+    notes = opened(file).describe().notes
+    assert (words in " ".join(notes)) if words else notes == ()

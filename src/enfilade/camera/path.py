@@ -99,7 +99,8 @@ class CameraPath:
 
     def select(self, numbers: Sequence[int]) -> CameraPath:
         """A path of some frames, by their rising numbers; a cut moves to the first of them at or after it."""
-        places = [self.numbers.index(number) for number in numbers]
+        place = {number: index for index, number in enumerate(self.numbers)}
+        places = [place[number] for number in numbers]
         cuts = {bisect_left(places, cut) for cut in self.cuts} - {0, len(places)}
         cameras = tuple(self.cameras[place] for place in places)
         return CameraPath(cameras, tuple(numbers), self.fps, frozenset(cuts))

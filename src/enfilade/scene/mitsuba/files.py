@@ -23,10 +23,16 @@ from enfilade.settings import LimitSettings
 
 PARSER_VARIANT = "scalar_rgb"  # required by the parser, which is the same for all variants
 PLUGINS = Path(mi.__file__).resolve().parent / "plugins"
+INSTEAD = {  # of plugins that need a spectral variant of Mitsuba, or end the process: what to write
+    "blackbody": "<rgb> with the colour of that temperature",
+    "timed_sunsky": '<emitter type="sunsky">',
+}
 BLENDER = "blender"  # its meshes are addresses in the memory of a process
 SOURCE_LOCATION = re.compile(r"\[\w+\.(?:cpp|h):\d+\] ")
+PYTHON_FUNCTION = re.compile(r"^\w+\(\): ")  # before messages of ours that go through Mitsuba's log
 NUMBERS = ("Float", "Vector", "Color", "Transform")  # types of properties
 NOT_FINITE = re.compile(r"\b(?:nan|inf)\b")
+UNDEFINED = re.compile(r"undefined parameter: \$(\w+)")
 QUOTED_SPECTRUM = re.compile(r'(failed to load spectrum from file ".*?"): .*', re.DOTALL)
 
 
@@ -48,6 +54,11 @@ def check_scene(scene: Path, limits: LimitSettings) -> None:
             if name != "scene" and not _is_own_plugin(name, resolver):
                 where = mi.parser.file_location(state, node)
                 raise SceneError(f"{where}: {name!r} is not one of Mitsuba's plugins for scene files")
+            if name in INSTEAD:
+                where = mi.parser.file_location(state, node)
+                raise SceneError(
+                    f"{where}: {name} can't be rendered here; write {INSTEAD[name]} in its place"
+                )
             _check_numbers(state, node)
             if name == "instance":
                 _check_instance(state, node)
@@ -101,8 +112,10 @@ def collected_warnings() -> Iterator[list[str]]:
 
     class Message(mi.Formatter):
         def format(self, level: Any, cname: str | None, fname: str, line: int, msg: str) -> str:
-            del level, cname, fname, line
-            return f"Mitsuba warns: {' '.join(msg.split())}"
+            del level, fname, line
+            text = " ".join(msg.split())
+            own = PYTHON_FUNCTION.sub("", text)
+            return own if own != text else f"{cname or 'Mitsuba'} warns: {text}"
 
     class Collector(mi.Appender):
         def append(self, level: Any, text: str) -> None:
@@ -127,26 +140,36 @@ def collected_warnings() -> Iterator[list[str]]:
 
 
 @contextmanager
-def _parsed(scene: Path) -> Iterator[tuple[Any, Any]]:
-    """The parsed scene, and the file resolver with all folders in which its files are looked for."""
-    _check_there(scene)
+def files_beside(scene: Path) -> Iterator[Any]:
+    """Look for files in the folder of a scene first, links followed; the file resolver."""
     untyped: Any = mi  # its stubs lack the functions of the file resolver
     before = untyped.file_resolver()
     resolver = mi.FileResolver(before)
     resolver.prepend(str(scene.resolve().parent))
     untyped.set_file_resolver(resolver)
     try:
-        with collected_warnings():  # they come again when the scene is loaded
-            state = mi.parser.parse_file(mi.parser.ParserConfig(PARSER_VARIANT), str(scene.resolve()))
-        yield state, resolver
+        yield resolver
+    finally:
+        untyped.set_file_resolver(before)
+
+
+@contextmanager
+def _parsed(scene: Path) -> Iterator[tuple[Any, Any]]:
+    """The parsed scene, and the file resolver with all folders in which its files are looked for."""
+    _check_there(scene)
+    try:
+        with files_beside(scene) as resolver:
+            with collected_warnings():  # they come again when the scene is loaded
+                state = mi.parser.parse_file(mi.parser.ParserConfig(PARSER_VARIANT), str(scene.resolve()))
+            yield state, resolver
     except RuntimeError as error:
-        raise SceneError(f"Mitsuba can't parse {scene}: {reason(error)}") from error
+        undefined = UNDEFINED.search(str(error))
+        hint = f'; add <default name="{undefined[1]}" value="..."/> to it' if undefined else ""
+        raise SceneError(f"Mitsuba can't parse {scene}: {reason(error)}{hint}") from error
     except UnicodeDecodeError as error:
         raise SceneError(f"{scene} or a file that it includes is not UTF-8: {error}") from error
     except OSError as error:
         raise SceneError(f"can't read {error.filename}, which {scene} uses: {error.strerror}") from error
-    finally:
-        untyped.set_file_resolver(before)
 
 
 def _check_there(scene: Path) -> None:

@@ -16,6 +16,10 @@ PATH_TRACERS = {  # Mitsuba's classes that trace paths from the camera to their 
     "VolumetricPathIntegrator": "volpath",
     "VolpathMisIntegratorImpl": "volpathmis",
 }
+POLARIZING = ("CircularPolarizer", "LinearPolarizer", "LinearRetarder", "MeasuredPolarized")
+# Rays start this far from a surface: times one and the largest coordinate there, as Mitsuba moves them.
+RAY_OFFSET = 1500 * 2.0**-24
+LARGEST_OFFSET = 2e-4  # of the scene's diagonal
 NEAR_SHARE = 0.01  # of the scene's diagonal: what is nearer than that is hardly ever in sight
 
 
@@ -27,21 +31,38 @@ def scene_integrator(scene: Any, max_depth: int) -> Any:
     SceneError
         It does not compute the radiance along single rays, or has no limit of the path depth.
     """
-    own = scene.integrator() or mi.load_dict({"type": "path"})
+    own = _innermost(scene.integrator() or mi.load_dict({"type": "path"}))
     # Differentiable integrators are sampling integrators by class, but take other arguments.
     if not isinstance(own, mi.SamplingIntegrator) or isinstance(own, mi.CppADIntegrator):
         raise SceneError(
             f"the scene's integrator, {type(own).__name__}, can't render single pixels; "
             'write <integrator type="path"/> in its place'
         )
-    if not max_depth:
-        return own
     if own.class_name() not in PATH_TRACERS:
+        if not max_depth:
+            return own
         raise SceneError(
             f"the scene's integrator, {own.class_name()}, has no limit of the path depth: leave "
             '--max-depth out, or write <integrator type="path"/> in its place'
         )
-    return _limited(own, max_depth, _depths(own)[1])
+    # Where camera rays pass hidden emitters (`Shapes`), the integrator need not.
+    hides = own.hide_emitters and has_media(scene)
+    depth, rr_depth = _depths(own)
+    return _limited(own, max_depth or depth, rr_depth, hides_emitters=hides)
+
+
+def hides_emitters(scene: Any) -> bool:
+    """Whether the camera does not see a scene's emitters."""
+    own = scene.integrator()
+    return own is not None and bool(getattr(_innermost(own), "hide_emitters", False))
+
+
+def _innermost(integrator: Any) -> Any:
+    """The path tracer in an integrator that writes AOVs or moments of it; others themselves."""
+    if integrator.class_name() not in ("AOVIntegrator", "MomentIntegrator"):
+        return integrator
+    nested = [n for n in mi.traverse(integrator).hierarchy if n.class_name() in PATH_TRACERS]
+    return nested[0] if len(nested) == 1 else integrator
 
 
 def shortened(integrator: Any, path_depth: int, end_depth: int | None = None) -> Any:
@@ -67,8 +88,6 @@ def why_inseparable(scene: Any, integrator: Any) -> str:
     """Reason why an integrator's radiance is not the sum of emission and lobes; empty if it is."""
     if integrator.class_name() not in PATH_TRACERS:
         return f"its integrator is {integrator.class_name()}, not a path tracer"
-    if integrator.hide_emitters:
-        return "its integrator hides the emitters"
     max_depth, _ = _depths(integrator)
     if max_depth <= MAX_PATH_DEPTH:
         return f"its paths end at depth {max_depth} (--max-depth {MAX_PATH_DEPTH + 1} or more continues them)"
@@ -78,8 +97,12 @@ def why_inseparable(scene: Any, integrator: Any) -> str:
 
 
 def ignored(scene: Any, integrator: Any) -> list[str]:
-    """What a scene has and frames will not show: lenses and clipping of its sensors, media, some emitters."""
-    diagonal = float(np.linalg.norm(scene.bbox().extents()))
+    """What a scene has and frames will not show right.
+
+    Lenses and clipping of its sensors, media, some emitters, polarization, contacts far from the origin.
+    """
+    box = scene.bbox()
+    diagonal, farthest = (float(np.linalg.norm(box.extents())), float(np.abs([box.min, box.max]).max()))
     notes = [
         f"the scene's sensor is a {sensor.class_name()}: every frame is the perspective image of a pinhole"
         for sensor in scene.sensors()
@@ -100,9 +123,20 @@ def ignored(scene: Any, integrator: Any) -> list[str]:
         for emitter in scene.emitters()
         if emitter.class_name() == "DirectionalArea"
     ]
-    if not is_volumetric(integrator) and has_media(scene):
+    offset = RAY_OFFSET * (1.0 + farthest)
+    if offset > LARGEST_OFFSET * diagonal:
         notes.append(
-            "the scene has participating media, which its integrator ignores: "
+            f"rays start {offset:.2g} units from surfaces, since coordinates reach {farthest:.3g} and the "
+            f"scene measures {diagonal:.3g}: shadows of what is nearer are lost; move it to the origin, or "
+            "enlarge it"
+        )
+    if {node.class_name() for node in mi.traverse(scene).hierarchy}.intersection(POLARIZING):
+        notes.append("light has no polarization here: polarizers and retarders do not show their effect")
+    if has_media(scene):
+        notes.append(
+            "the camera is taken to be in the medium of the scene's first sensor in all frames"
+            if is_volumetric(integrator)
+            else "the scene has participating media, which its integrator ignores: "
             '<integrator type="volpath"/> and --method reference show them'
         )
     return notes
@@ -126,6 +160,12 @@ def _depths(integrator: Any) -> tuple[int, int]:
     return int(found[1]), int(found[2])
 
 
-def _limited(integrator: Any, max_depth: int, rr_depth: int) -> Any:
-    same = {"type": PATH_TRACERS[integrator.class_name()], "hide_emitters": integrator.hide_emitters}
-    return mi.load_dict({**same, "max_depth": max_depth, "rr_depth": rr_depth})
+def _limited(integrator: Any, max_depth: int, rr_depth: int, *, hides_emitters: bool = False) -> Any:
+    return mi.load_dict(
+        {
+            "type": PATH_TRACERS[integrator.class_name()],
+            "max_depth": max_depth if max_depth < UNLIMITED else -1,
+            "rr_depth": rr_depth,
+            "hide_emitters": hides_emitters,
+        }
+    )

@@ -11,11 +11,16 @@ import mitsuba as mi
 import numpy as np
 
 from enfilade.arrays import lanes
+from enfilade.device import active
 from enfilade.errors import SceneError
 from enfilade.resource_limits import is_out_of_memory
 from enfilade.scene.mitsuba.bsdfs import classes
-from enfilade.scene.mitsuba.files import fingerprint, reason
+from enfilade.scene.mitsuba.files import files_beside, fingerprint, reason
+from enfilade.scene.mitsuba.shapes import has_meaning
 
+SCALE_TOLERANCE = 1e-4  # of the columns of a transform that does not scale
+# Emitters whose light Mitsuba 3.9.1 changes with the scale of their transform: directions get its length.
+SCALED_EMITTERS = ("directional", "envmap", "projector", "sunsky")
 SHEAR = 1e-4  # of UV maps below bump maps: V rises by a ten-thousandth of U
 
 
@@ -38,7 +43,7 @@ def load_scene(file: Path) -> Any:
     if threads == 1:  # Mitsuba waits for the tasks that read an OpenEXR file without running any of them
         dr.set_thread_count(2)
     try:
-        scene = mi.load_file(str(file.resolve()), parallel=False, optimize=False)
+        scene = _instantiated(file)
     except (RuntimeError, UnicodeDecodeError) as error:
         if is_out_of_memory(str(error)):
             raise MemoryError(f"too little memory to load {file}") from error
@@ -59,6 +64,22 @@ def load_scene(file: Path) -> Any:
             "world with light, and import it again"
         )
     return scene
+
+
+def _instantiated(file: Path) -> Any:
+    """The object of a scene file; equal materials and textures are made once, however often they are written.
+
+    Where the id of a BSDF has a meaning they are not: Mitsuba ignores ids when it compares.
+    """
+    config = mi.parser.ParserConfig(active().variant)
+    config.parallel = config.merge_meshes = False
+    with files_beside(file):
+        state = mi.parser.parse_file(config, str(file.resolve()))
+        config.merge_equivalent = not any(has_meaning(node.props.id()) for node in state.nodes)
+        for node in state.nodes:
+            _unscale(state, node)
+        mi.parser.transform_all(config, state)
+        return mi.parser.instantiate(config, state)
 
 
 def _check_content(file: Path, scene: Any) -> None:
@@ -91,11 +112,9 @@ def _check_mesh(file: Path, mesh: Any) -> None:
             f"{file}: the to_world of the shape {mesh.id()} leaves it no normals: does it scale by zero?"
         )
 
-    untyped: Any = mi  # its stubs lack the logger
-    untyped.Log(
-        mi.LogLevel.Warn,
+    _warn(
         f"{is_bad.sum()} of {len(normals)} vertices of the mesh {mesh.id()} have no normal, and get that "
-        "of the triangles around them",
+        "of the triangles around them"
     )
 
     # Add up the normals of the triangles, weighted by their area.
@@ -117,13 +136,40 @@ def _check_finite(file: Path, name: str, values: Any) -> None:
     """Refuse an image with values that are NaN or infinite: paths that meet them would be left out."""
     is_bad = ~np.isfinite(values)
     if is_bad.any():
-        row, column = np.argwhere(is_bad)[0][:2]
-        height, width = values.shape[:2]
+        row, column = np.argwhere(is_bad)[0][-3:-1]  # of a slice, if it is a volume
+        height, width = values.shape[-3:-1]
         owner = "" if name.startswith("object_") else f" of {name}"  # Mitsuba's names of what has none
         raise SceneError(
             f"{file}: an image{owner} has {is_bad.sum()} values that are NaN or infinite, first in row "
             f"{row}, column {column} of {width}x{height}; mend it"
         )
+
+
+def _unscale(state: Any, node: Any) -> None:
+    """Take the scale out of the transform of an emitter whose light it would change, and say so."""
+    properties = node.props
+    if properties.plugin_name() not in SCALED_EMITTERS or "to_world" not in properties:
+        return
+    transform = properties["to_world"]
+    matrix = np.array(transform.matrix, np.float64).reshape(4, 4)
+    lengths = np.linalg.norm(matrix[:3, :3], axis=0)
+    if np.allclose(lengths, 1.0, rtol=0.0, atol=SCALE_TOLERANCE):
+        return
+    emitter = f"the {properties.plugin_name()} emitter {properties.id()}".rstrip()
+    where = mi.parser.file_location(state, node)
+    if not lengths.all():
+        raise SceneError(f"{where}: the to_world of {emitter} scales by zero")
+    matrix[:3, :3] /= lengths
+    properties["to_world"] = type(transform)(matrix)
+    _warn(
+        f"{where}: the to_world of {emitter} has a scale, which would change its light: it is taken without "
+        "the scale"
+    )
+
+
+def _warn(text: str) -> None:
+    untyped: Any = mi  # its stubs lack the logger
+    untyped.Log(mi.LogLevel.Warn, text)
 
 
 def _shear_bump_maps(scene: Any) -> None:
@@ -144,8 +190,4 @@ def _shear_bump_maps(scene: Any) -> None:
         elif "to_world" in parameters:  # of a rectangle
             x, y, z = np.abs(np.array(parameters["to_world"].matrix, np.float32).reshape(4, 4)[:3, 0])
             if max(x, y) < SHEAR * z:
-                untyped: Any = mi  # its stubs lack the logger
-                untyped.Log(
-                    mi.LogLevel.Warn,
-                    f"the rectangle {mesh.id()} loses light where its bump map is flat: write it as a mesh",
-                )
+                _warn(f"the rectangle {mesh.id()} loses light where its bump map is flat: write it as a mesh")

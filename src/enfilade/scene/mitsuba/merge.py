@@ -2,7 +2,7 @@
 
 Every launch of a kernel goes through all arrays of all shapes: a scene of 774 shapes costs 30 ms a launch.
 Instances cost more: the time that Mitsuba takes to record an intersection, of which a kernel has many, grows
-with the square of their number, to 10 s for 1000 of them. Mitsuba's own merging (``optimize``) leaves
+with the square of their number, to 10 s for 1000 of them. Mitsuba's own merging (``merge_meshes``) leaves
 instances as they are, does not tell which shape of the file a triangle comes from, and its order may vary.
 """
 

@@ -40,6 +40,7 @@ from enfilade.scene.mitsuba.bsdfs import why_opaque
 from enfilade.scene.mitsuba.emitters import find_emitters, partly_sampled, trace_photons
 from enfilade.scene.mitsuba.files import collected_warnings
 from enfilade.scene.mitsuba.integrators import (
+    hides_emitters,
     ignored,
     is_volumetric,
     max_path_depth,
@@ -94,11 +95,11 @@ class MitsubaRenderer:
         self._sampler = _lane_sampler()
         self._lobes = Lobes(scene)
         self._is_volumetric = is_volumetric(self._integrator)
-        self._shapes = Shapes(self._merged)
+        self._shapes = Shapes(self._merged, hides_emitters=hides_emitters(scene))
         self._description = SceneDescription(
             renderer=f"Mitsuba {mi.__version__}",
             shapes=self._shapes.names,
-            has_background=scene.environment() is not None,
+            has_background=scene.environment() is not None and not self._shapes.hides_emitters,
             notes=(*ignored(scene, self._integrator), *partly_sampled(self._merged), *warnings),
         )
         self._surfaces = recorded(
@@ -204,7 +205,7 @@ class MitsubaRenderer:
         return ShadingPoint(
             surfaces=surfaces,
             position=Array3f(si.p),
-            emission=self._transport.emission(si, bounce, active),
+            emission=self._transport.emission(si, bounce, active & self._is_seen(si, bounce is None)),
             has_specular=self._lobes.has_specular(si, bsdf),
             may_pass=has_lobe(bsdf.flags(), "Null"),
             is_coated=self._lobes.is_coated(si, bsdf),
@@ -318,9 +319,15 @@ class MitsubaRenderer:
     def _radiance(self, rays: Rays, sampler: Any) -> Any:
         """Radiance along camera rays."""
         ray = _ray(rays)
+        active = Bool(True)
         if self._shapes.has_hidden:
-            *_, ray = self._intersect_beyond(ray, Bool(True), NULL_PATH)
-        return self._sampled(self._integrator, ray, sampler)[0]
+            si, _, ray = self._intersect_beyond(ray, active, NULL_PATH)
+            active = self._is_seen(si, True)
+        return dr.select(active, self._sampled(self._integrator, ray, sampler)[0], 0.0)
+
+    def _is_seen(self, si: Any, from_camera: bool) -> Any:
+        """Whether what a ray meets may be seen: the background is not where emitters are hidden; Bool."""
+        return si.is_valid() if from_camera and self._shapes.hides_emitters else Bool(True)
 
     def _continued_radiance(
         self, rays: Rays, sampler: Any, depths: tuple[int, int], active: Any

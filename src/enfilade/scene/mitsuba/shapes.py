@@ -24,6 +24,8 @@ class Shapes:
     Parameters
     ----------
     merged
+    hides_emitters
+        Whether the camera sees no emitters.
 
     Attributes
     ----------
@@ -34,9 +36,11 @@ class Shapes:
     has_hidden : bool
         Whether there are lamps or hidden surfaces. Camera rays pass them, but for scenes with participating
         media.
+    hides_emitters : bool
+        Whether camera rays pass all emitters, and meet a black background.
     """
 
-    def __init__(self, merged: MergedScene) -> None:
+    def __init__(self, merged: MergedScene, *, hides_emitters: bool = False) -> None:
         scene = merged.scene
         shapes = scene.shapes()
         registry = [registry_index(mi.ShapePtr(shape)) for shape in shapes]
@@ -55,8 +59,9 @@ class Shapes:
         self._is_hidden = bsdf_table(scene, lambda bsdf: is_clear and bsdf.id().startswith(HIDDEN))
         self.names = merged.names
         has_hidden = bool(dr.any(self._is_hidden))
-        self.may_be_null = bool(dr.any(self._is_null)) or has_hidden
-        self.has_hidden = bool(lamps.any()) or has_hidden
+        self.hides_emitters = is_clear and hides_emitters
+        self.may_be_null = bool(dr.any(self._is_null)) or has_hidden or self.hides_emitters
+        self.has_hidden = bool(lamps.any()) or has_hidden or self.hides_emitters
 
     @property
     def state(self) -> Any:
@@ -92,6 +97,8 @@ class Shapes:
         transmitted = bsdf.eval_null_transmission(si, is_null)
         is_dark = ~si.shape.is_emitter() | self.is_lamp(si)
         is_hidden = dr.gather(Bool, self._is_hidden, number, si.is_valid())
+        if self.hides_emitters:
+            is_hidden |= si.is_valid() & si.shape.is_emitter()
         return is_hidden | (is_null & is_dark & (mi.luminance(transmitted) > transmittance))
 
 
@@ -99,6 +106,11 @@ def is_lamp(shape: Any) -> bool:
     """Whether a shape gives light but is no surface: an emitter whose BSDF is :data:`LAMP`."""
     bsdf = shape.bsdf()
     return bool(shape.is_emitter() and bsdf.class_name() == "Null" and bsdf.id() == LAMP)
+
+
+def has_meaning(bsdf_id: str) -> bool:
+    """Whether the id of a BSDF says what the camera sees of its shapes."""
+    return bsdf_id == LAMP or bsdf_id.startswith(HIDDEN)
 
 
 def has_null_interactions(bsdf: Any) -> bool:
