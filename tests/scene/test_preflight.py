@@ -56,6 +56,13 @@ NEAR = '<float name="near_clip" value="{}"/>'
             f'<sensor type="perspective"><float name="far_clip" value="3"/></sensor>{BALL}',
             ["of 0.01 to 3 al"],
         ),
+        (
+            (
+                '<shape type="sphere"><transform name="to_world"><scale x="2"/></transform></shape>'
+                '<emitter type="constant"/>'
+            ),
+            ["Mitsuba warns of a Sphere: 'to_world' transform shouldn't contain non-uniform"],
+        ),
         (f'<integrator type="path"/>{FOG}', ["participating media"]),
         (f'<integrator type="volpath"/>{FOG}', ["the camera is taken to be in the medium"]),
         (
@@ -78,7 +85,7 @@ def test_it_reports_warnings_of_mitsuba_and_leaves_its_log_as_it_was(scene):
         b"PF\n8 4\n-1.0\n" + np.full((4, 8, 3), 2.0, np.float32).tobytes()
     )
     (note,) = checked(file).notes
-    assert re.search(r'^BitmapTexture warns: .*"bright.pfm" contains pixels that exceed', note)
+    assert re.search(r'^Mitsuba warns: .*"bright.pfm" contains pixels that exceed', note)
 
     def log():
         logger = mi.logger()

@@ -115,7 +115,10 @@ def collected_warnings() -> Iterator[list[str]]:
             del level, fname, line
             text = " ".join(msg.split())
             own = PYTHON_FUNCTION.sub("", text)
-            return own if own != text else f"{cname or 'Mitsuba'} warns: {text}"
+            if own != text:
+                return own
+            plugin = re.split(r"Impl|\[", cname or "")[0]
+            return f"Mitsuba warns{'' if plugin in text else f' of a {plugin}'}: {text}"
 
     class Collector(mi.Appender):
         def append(self, level: Any, text: str) -> None:
