@@ -8,13 +8,14 @@ import shutil
 
 import numpy as np
 import pytest
+from markupsafe import escape
 from PIL import Image
 
 import enfilade
 from enfilade.comparison import CompareOptions, compare
 from enfilade.errors import DamagedFileError, ImageError, RunFolderError, SettingsError
 from enfilade.files import write_json
-from enfilade.images import read_exr
+from enfilade.images import read_exr, write_exr
 from enfilade.images.view import open_view
 from enfilade.kernels.tone import srgb_encode
 from enfilade.monitor import Silence
@@ -29,7 +30,7 @@ from enfilade.runs.lock import Lock
 from enfilade.runs.statistics import statistics
 from enfilade.settings import VideoSettings
 from support.fake_blender import NOTE, RESULT
-from support.synthetic_runs import synthetic_run
+from support.synthetic_runs import FRAMES, SIZE, synthetic_run
 
 
 class Notes(Silence, list):
@@ -124,6 +125,26 @@ def test_the_score_is_that_of_compare(runs, page_file):
     assert series_of(text, data_of(text))["quality"]["score"] == pytest.approx(scores, abs=1e-3)
     assert f"{found['score_jnd']:.2f} JND" in text
     assert f"{found['psnr_db']:.2f} dB" in text
+
+
+def test_the_remarks_of_the_comparison_are_notes(copied, tmp_path):
+    """The run and the reference are of one method and seed, along other poses; a frame is negative."""
+    path = {"size": list(SIZE), "fps": 24.0, "frames": list(FRAMES), "cuts": [6], "poses": "4567"}
+    reference = synthetic_run(tmp_path / "reference", path=path)
+    file = reference / "frames" / "0003.exr"
+    layers = read_exr(file)
+    layers["RGB"][5, 5] = -0.5
+    write_exr(file, layers)
+    notes, text, _ = written(copied, tmp_path, reference=reference)
+    for part in (
+        "from the reference",
+        "different camera paths",
+        "one method and --seed 7",
+        "negative values",
+    ):
+        assert sum(part in note for note in notes) == 1
+    assert len(notes) == 4
+    assert all(str(escape(note)) in text for note in notes)
 
 
 def test_a_second_reference_adds_the_noise_floor(runs, copied, tmp_path):

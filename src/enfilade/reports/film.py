@@ -13,7 +13,7 @@ from enfilade.comparison import ComparedFrame, CompareOptions, compare
 from enfilade.comparison.measures import DisplayedPair
 from enfilade.images.stills import embedded, resized
 from enfilade.images.view import ViewTransform
-from enfilade.monitor import SILENCE, Monitor
+from enfilade.monitor import Monitor, Silence
 from enfilade.records import F32, U8
 from enfilade.reports.layers import LAYERS, Layer, painted, painted_difference
 from enfilade.reports.run import ReportedRun
@@ -49,7 +49,7 @@ class Film:
     difference : dict or None
         ``SequenceDifference.to_dict()`` from the reference.
     notes : list of str
-        What was scaled or left out.
+        Remarks of the comparison, and what was scaled or left out.
 
     Raises
     ------
@@ -126,10 +126,12 @@ class Film:
                 if index in kept:
                     self._add(index, painted_difference(frame, absolute.map_percent))
 
-        of = run.viewing_settings
-        options = CompareOptions(viewing=of, exposure_ev=of.exposure_ev, measures=[absolute])
+        options = CompareOptions(
+            display=run.viewing, exposure_ev=run.viewing_settings.exposure_ev, measures=[absolute]
+        )
         first, second, *_ = *references, None
-        found = compare(run.folder, first, options, SILENCE, second_reference=second, show=show)
+        remarks = _Remarks(self.notes)
+        found = compare(run.folder, first, options, remarks, second_reference=second, show=show)
         return found.to_dict()
 
     def _add(self, index: int, differences: Mapping[str, U8] | None = None) -> None:
@@ -147,6 +149,16 @@ class Film:
                 picture = resized(pictures[layer.name], self.size, is_mixed=not layer.is_overlay)
                 found[layer.name] = embedded(picture, is_lossless=layer.is_overlay)
         return found
+
+
+class _Remarks(Silence):
+    """A monitor that adds messages to notes."""
+
+    def __init__(self, notes: list[str]) -> None:
+        self._notes = notes
+
+    def message(self, text: str) -> None:
+        self._notes.append(text)
 
 
 class AbsoluteDifference:

@@ -55,7 +55,7 @@ def write_report(
     max_mb
         Megabytes of pictures: larger ones are scaled, then frames are left out. At least 1.
     monitor
-        Receives progress, and the notes of the page: damage, and omissions.
+        Receives progress, and the notes of the page: damage, omissions, and remarks on the comparison.
 
     Returns
     -------
