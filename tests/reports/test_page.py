@@ -31,6 +31,7 @@ from enfilade.runs.statistics import statistics
 from enfilade.settings import VideoSettings
 from support.fake_blender import NOTE, RESULT
 from support.synthetic_runs import FRAMES, SIZE, synthetic_run
+from support.views import write_config
 
 
 class Notes(Silence, list):
@@ -145,6 +146,20 @@ def test_the_remarks_of_the_comparison_are_notes(copied, tmp_path):
         assert sum(part in note for note in notes) == 1
     assert len(notes) == 4
     assert all(str(escape(note)) in text for note in notes)
+
+
+def test_the_comparison_has_the_view_of_the_video(copied, runs, tmp_path):
+    pytest.importorskip("PyOpenColorIO")
+    job = json.loads((copied / "job.json").read_text())
+    before = series_of(*written(copied, tmp_path, reference=runs / "reference")[1:])["quality"]["score"]
+    job["settings"]["video"]["ocio"] = write_config(tmp_path)
+    write_json(copied / "job.json", job)
+    plain = runs / "reference" / "frames"
+    notes, text, data = written(copied, tmp_path, reference=plain)
+    assert sum("the view default of " in note for note in notes) == 1
+    scores = series_of(text, data)["quality"]["score"]
+    assert scores != pytest.approx(before, rel=0.05)
+    assert scores == pytest.approx([row.score for row in enfilade.compare(copied, plain).frames], abs=1e-3)
 
 
 def test_a_second_reference_adds_the_noise_floor(runs, copied, tmp_path):

@@ -22,6 +22,7 @@ from enfilade.comparison.matching import (
     note_on_seeds,
 )
 from enfilade.comparison.measures.displayed import DisplayedPair, on_screen
+from enfilade.comparison.views import View, open_views
 from enfilade.errors import ImageError
 from enfilade.images import open_sequence
 from enfilade.kernels.tone import luminance, srgb_encode
@@ -45,7 +46,7 @@ class Pair(DisplayedPair):
     reference_grey : (H, W) float32
         Luminance of the reference, 1 = white, encoded for an sRGB display.
     is_identical : bool
-        Whether no channel of any pixel differs, before clipping.
+        Whether no channel of any pixel differs, before clipping and on the display.
     halves : Pair or None
         Of two references, the first as the test and the second as the reference; `reference` is their mean.
         None where there is one.
@@ -92,7 +93,7 @@ class Pairs:
         Indices of frames that begin a shot, or follow a gap in a run; None where neither is a run that
         says so.
     notes : tuple of str
-        Remarks on the sequences, on their pairing, and on layers that were chosen.
+        Remarks on the sequences, on their pairing and views, and on layers that were chosen.
 
     Raises
     ------
@@ -115,7 +116,13 @@ class Pairs:
         known = [s.starts for s in self._sequences if s.starts is not None]
         self.starts = frozenset[int]().union(*known) if known else None
         pairing = (note_on_numbers(*couple) or note_on_paths(*couple) for couple in couples)
-        said = (*pairing, *(note_on_seeds(*couple) for couple in couples), *(s.note for s in self._sequences))
+        self._views, of_views = open_views(sides)
+        said = (
+            *of_views,
+            *pairing,
+            *(note_on_seeds(*couple) for couple in couples),
+            *(s.note for s in self._sequences),
+        )
         self.notes = tuple(dict.fromkeys(filter(None, said)))
         self._exposures_ev = [self.exposure_ev if is_exr(s) else 0.0 for s in self._sequences]
 
@@ -130,7 +137,8 @@ class Pairs:
     def displayed(self, viewing: Viewing, monitor: Monitor) -> Iterator[Pair]:
         """Frames as the display shows them; each is read when it is needed.
 
-        Negative values, which no display shows, are black; a message says so once.
+        Negative values, which no display shows, are black; a message says so once. A view of OpenColorIO
+        shows them in its own way.
 
         Raises
         ------
@@ -139,8 +147,8 @@ class Pairs:
         """
         is_said = False
         for index, images in enumerate(zip(*self._sequences, strict=True)):
-            for image, sequence in zip(images, self._sequences, strict=True):
-                if _checked(image, sequence.name(index)) < 0.0 and not is_said:
+            for image, sequence, view in zip(images, self._sequences, self._views, strict=True):
+                if _checked(image, sequence.name(index)) < 0.0 and view is None and not is_said:
                     monitor.message(f"{sequence.name(index)} holds negative values, which are shown as black")
                     is_said = True
             yield self._pair(index, images, viewing)
@@ -149,20 +157,28 @@ class Pairs:
         # Equal images stay exactly equal: all take the same steps.
         exposed = [image * np.float32(2.0**ev) for image, ev in zip(images, self._exposures_ev, strict=True)]
         test, *references = exposed
+        views = self._views[0], self._views[1]
         if len(references) == 1:
-            return self._of_two(index, test, references[0], viewing)
+            return self._of_two(index, test, references[0], viewing, views)
         first, second = references
-        halves = self._of_two(index, first, second, viewing)
+        halves = self._of_two(index, first, second, viewing, (self._views[1], self._views[2]))
         if halves.is_identical and np.ptp(first) > 0.0:
             raise ImageError(
                 f"the two references are equal in frame {halves.number} ({self.reference.name(index)}), so "
                 "they are not independent; render the second one with another --seed"
             )
-        pair = self._of_two(index, test, np.float32(0.5) * (first + second), viewing)
-        is_identical = all(np.array_equal(test, reference) for reference in references)
+        pair = self._of_two(index, test, np.float32(0.5) * (first + second), viewing, views)
+        is_identical = pair.is_identical and halves.is_identical
         return replace(pair, halves=halves, is_identical=is_identical)
 
-    def _of_two(self, index: int, test: F32, reference: F32, viewing: Viewing) -> Pair:
+    def _of_two(
+        self, index: int, test: F32, reference: F32, viewing: Viewing, views: tuple[View | None, View | None]
+    ) -> Pair:
+        is_identical = np.array_equal(test, reference)
+        test, reference = (
+            image if view is None else view(image)
+            for image, view in zip((test, reference), views, strict=True)
+        )
         shown = [on_screen(image, viewing) for image in (test, reference)]
         numbers = self.test.numbers
         return Pair(
@@ -174,7 +190,7 @@ class Pairs:
             name=self.test.name(index),
             number=index + 1 if numbers is None else numbers[index],
             reference_grey=srgb_encode(luminance(np.clip(reference, 0.0, 1.0))),
-            is_identical=np.array_equal(test, reference),
+            is_identical=is_identical and np.array_equal(shown[0][0], shown[1][0]),
         )
 
 

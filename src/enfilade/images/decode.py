@@ -52,6 +52,7 @@ class VideoFile:
     numbers: tuple[int, ...] | None = None
     starts: frozenset[int] | None = None
     identity: None = None
+    view: None = None
     note: str = ""
 
     def __init__(self, file: Path) -> None:

@@ -15,6 +15,7 @@ from enfilade.images.beauty import beauty, choose_layer
 from enfilade.images.exr import read_attributes, read_exr
 from enfilade.images.stills import STILL_SUFFIXES, read_image
 from enfilade.records import F32
+from enfilade.settings import VideoSettings
 
 SUFFIXES = STILL_SUFFIXES | {".exr"}
 REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)  # ITU-R BT.709-6, item 1.3-1.4: R G B white
@@ -41,6 +42,8 @@ class ImageFiles:
         Of a run: indices of frames that do not follow the one before. None if unknown.
     identity : mapping or None
         Of a run: everything on which its frames depend, as ``run.json`` has it. None if unknown.
+    view : VideoSettings or None
+        Of a run: ``ocio``, ``view``, ``look`` and ``display`` of its video. None if unknown.
     layer : str or None
         Of all OpenEXR files, see :func:`~enfilade.images.beauty.choose_layer`.
     width, height : int
@@ -60,6 +63,7 @@ class ImageFiles:
     numbers: tuple[int, ...] | None = None
     starts: frozenset[int] | None = None
     identity: Any = None
+    view: VideoSettings | None = None
     layer: str | None = None
 
     def __post_init__(self) -> None:

@@ -14,6 +14,7 @@ from enfilade.files import read_json
 from enfilade.images.container import DEMUXERS
 from enfilade.images.decode import VideoFile
 from enfilade.images.imagefiles import SUFFIXES, ImageFiles
+from enfilade.settings import VideoSettings
 
 RUN_FILE, JOB_FILE = "run.json", "job.json"
 FRAMES = "frames"  # folder of a run's images
@@ -107,6 +108,7 @@ def _of_run(files: list[Path], numbers: tuple[int, ...] | None, layer: str | Non
         numbers=numbers,
         starts=None if numbers is None else _starts(numbers, value_at(identity, "path")),
         identity=None if numbers is None else identity,
+        view=_view(job),
         layer=layer,
     )
 
@@ -179,6 +181,13 @@ def _starts(numbers: tuple[int, ...], path: Any) -> frozenset[int] | None:
     following = dict(pairwise(selected))
     steps = enumerate(pairwise(numbers), 1)
     return frozenset(i for i, (before, now) in steps if following.get(before) != now or now in cuts)
+
+
+def _view(job: Any) -> VideoSettings | None:
+    """The view transform of a run's video, by its job."""
+    table = {name: value_at(job, "settings", "video", name) for name in ("ocio", "view", "look", "display")}
+    known = {name: value for name, value in table.items() if isinstance(value, str)}
+    return VideoSettings.from_table(known) if known else None
 
 
 def value_at(table: Any, *keys: str) -> Any:

@@ -85,11 +85,6 @@ def write_report(
     notes = [*shown.notes, *film.notes]
     if dropped := shown.summary["dropped_samples"]:
         notes.append(f"{dropped} samples were NaN or infinite and were left out")
-    if shown.video.ocio:
-        notes.append(
-            f"the video has the view {shown.video.view or 'default'} of {shown.video.ocio}; scores "
-            "assume the sRGB curve, clipped at white"
-        )
     for note in notes:
         monitor.message(note)
     variables = contents(shown, film, None if source is None else _summary(source))
