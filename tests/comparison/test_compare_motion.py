@@ -112,7 +112,7 @@ def test_layers_that_end_or_hold_a_nan_name_the_frame(sequence):
 
 def moving_right(step_px):
     """Layers that tell the flow to the next frame alone."""
-    return {"motion": np.broadcast_to(np.float32((step_px, 0.0)), (*SIZE, 2)).copy()}
+    return {"motion": across(step_px)}
 
 
 def test_a_cut_between_shots_that_move_is_found_without_flow_to_the_last_frame(sequence):
@@ -127,6 +127,36 @@ def test_a_cut_between_shots_that_move_is_found_without_flow_to_the_last_frame(s
     assert found.flow == "layers"
     assert [f.transient.score for f in found.frames] == pytest.approx([0.0] * 6, abs=1e-3)
     assert min(f.steady.score for f in found.frames) > 0.1
+
+
+@pytest.mark.parametrize("across_px", [2.0, 20.0, 500.0])
+@pytest.mark.parametrize("kind", ["own", "Vector"])
+def test_a_cut_that_motion_vectors_lead_across_is_found(tmp_path, kind, across_px):
+    """Blender and others write vectors to the neighbours of a frame also where they are of another shot."""
+    for name, factor in (("t", 0.8), ("r", 1.0)):
+        (tmp_path / name).mkdir()
+        for index in range(6):
+            f = index % 3
+            image = textured(-2.0 * f, 0.1 if index < 3 else 0.6)
+            image[10:30, 10 + 2 * f : 30 + 2 * f] *= np.float32(factor)  # on its surface
+            back, ahead = (across_px if index == cut else 2.0 for cut in (3, 2))
+            layers = {
+                "own": {"backward": across(-back), "forward": across(ahead)},
+                "Vector": {
+                    "Vector": np.stack([plane(-back), plane(0.0), plane(-ahead)], axis=-1),
+                    "Vector.W": plane(0.0),
+                },
+            }[kind]
+            write_exr(tmp_path / name / f"{index:04}.exr", {"RGB": image, **layers})
+    found = compared(tmp_path / "t", tmp_path / "r")
+    assert found.flow == "layers"
+    assert [f.transient.score for f in found.frames] == pytest.approx([0.0] * 6, abs=1e-3)
+    speed = found.viewing.velocity_deg_s(2.0)
+    assert [f.velocity_deg_s for f in found.frames] == pytest.approx([speed] * 6)
+
+
+def across(step_px):
+    return np.broadcast_to(np.float32((step_px, 0.0)), (*SIZE, 2)).copy()
 
 
 def test_a_frame_without_motion_came_as_the_one_before_and_then_rests(tmp_path):

@@ -20,8 +20,8 @@ from enfilade.records import F32, U8, Flow
 Layers = Mapping[str, npt.NDArray[Any]]
 FlowChoice: TypeAlias = Literal["auto", "layers", "estimate", "none"]
 
-CUT_DIFFERENCE = 0.1  # mean change of encoded luminance, 0..1: a cut, where backward motion is not known
-RESTING_DIFFERENCE = 0.02  # ... where it is known to be none: in a shot, the camera rests
+CUT_DIFFERENCE = 0.1  # mean change of encoded luminance, 0..1, along the motion where it is known: a cut
+RESTING_DIFFERENCE = 0.02  # ... where backward motion is known to be none: in a shot, the camera rests
 BLOCK_PX = 8  # over which it is averaged: noise is no cut
 
 
@@ -168,11 +168,27 @@ def _change(image: F32, before: F32) -> float:
 
 
 def _change_along(image: F32, before: F32, backward: F32) -> float:
-    """Mean change of blocks since the last frame, fetched along a flow, where that stays in the image."""
+    """Mean change of blocks since the last frame, fetched along a flow, where that stays in the image.
+
+    Where it stays nowhere, that of the same place.
+    """
     fetched, is_inside = moved(before, backward)
     covered = float(_blocks(is_inside.astype(np.float32)).mean())
     change = _blocks(np.where(is_inside, image - fetched, np.float32(0.0)))
-    return float(np.abs(change).mean()) / covered if covered else 0.0
+    return float(np.abs(change).mean()) / covered if covered else _change(image, before)
+
+
+def _apart(flow: Flow, earlier: Flow) -> tuple[Flow, Flow]:
+    """Flow of the first frame of a shot, and of the last of the one before, without that across the cut."""
+    none = np.zeros_like(flow.backward)
+    return (
+        replace(flow, backward=none, has_backward=False),
+        replace(earlier, forward=none, has_forward=False),
+    )
+
+
+def _moved(flow: Flow, *, is_cut: bool) -> Moved:
+    return Moved(flow.motion, None if is_cut else flow.backward, is_cut)
 
 
 class _FromLayers:
@@ -185,12 +201,12 @@ class _FromLayers:
         self.text = f"motion vectors: from the {role}'s layers {kind.text}"
 
     def follow(self, pairs: Iterable[Pair]) -> Iterator[tuple[Pair, Moved]]:
-        """Pairs with the flow of their layers.
+        """Pairs with the flow of their layers, one frame after they came.
 
-        Where neither a run nor a layer tells which frame is the last one, a cut is where the image changes
-        altogether.
+        Where no run tells, a cut is where the image changes altogether along the motion: renderers also write
+        motion vectors across cuts.
         """
-        before: F32 | None = None
+        waiting: tuple[Pair, Flow, bool] | None = None
         last: Flow | None = None
         for pair in pairs:
             read = flow = self._read(pair.index)
@@ -198,17 +214,29 @@ class _FromLayers:
                 # The last frame of a shot tells no motion: what came to it moved as in the frame before.
                 flow = replace(flow, backward=last.backward, has_backward=last.has_backward)
             last = read
-            now = pair.reference_grey
-            is_cut = before is not None and self._is_cut(pair.index, flow, now, before)
-            yield pair, Moved(flow.motion, None if is_cut else flow.backward, is_cut)
-            before = now
+            is_cut = False
+            if waiting is not None:
+                before, earlier, was_cut = waiting
+                is_cut = self._is_cut(pair.index, flow, pair.reference_grey, before.reference_grey)
+                if is_cut and self._has_unknown_cuts:
+                    flow, earlier = _apart(flow, earlier)
+                yield before, _moved(earlier, is_cut=was_cut)
+            waiting = pair, flow, is_cut
+        if waiting is not None:
+            yield waiting[0], _moved(waiting[1], is_cut=waiting[2])
+
+    @property
+    def _has_unknown_cuts(self) -> bool:
+        """Whether flow in both directions may lead across a cut."""
+        return self._starts is None and not self._kind.is_forward_only
 
     def _is_cut(self, index: int, flow: Flow, now: F32, before: F32) -> bool:
         if self._starts is not None:
             return index in self._starts
-        if self._kind.is_forward_only:
-            return _change_along(now, before, flow.backward) > CUT_DIFFERENCE
-        return not flow.has_backward and _change(now, before) > RESTING_DIFFERENCE
+        is_at_rest = not flow.has_backward and not self._kind.is_forward_only
+        return _change_along(now, before, flow.backward) > (
+            RESTING_DIFFERENCE if is_at_rest else CUT_DIFFERENCE
+        )
 
     def _read(self, index: int) -> Flow:
         name = self._sequence.name(index)
