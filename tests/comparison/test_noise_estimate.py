@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from PIL import Image
 from scipy.ndimage import gaussian_filter
 
 from enfilade.comparison.noise_estimate import noise_sigma
-from enfilade.kernels.tone import srgb_decode
+from enfilade.kernels.tone import srgb_decode, srgb_encode
 from support.sequences import compared
 
 SHIFT_PX = 1.4  # a frame, to the left: no whole pixels
@@ -105,6 +106,21 @@ def test_noise_that_hardly_matters_is_not_mentioned(sequence):
     found = compared(far, reference, flow="estimate")
     assert 0.0 < found.noise_estimate.score < found.score / 3.0
     assert found.noise_note == ""
+
+
+def test_noise_that_the_test_shares_is_no_part_of_the_score(sequence, tmp_path):
+    """The test is the reference as JPEGs."""
+    frames = frames_with(0.03, 2)
+    (tmp_path / "jpeg").mkdir()
+    for number, frame in enumerate(frames, 1):
+        encoded = np.round(255.0 * np.clip(srgb_encode(frame), 0.0, 1.0)).astype(np.uint8)
+        Image.fromarray(encoded).save(tmp_path / "jpeg" / f"{number:04}.jpg", quality=95)
+    found = compared(tmp_path / "jpeg", sequence("noisy", frames), flow="estimate")
+    estimate = found.to_dict()["noise_estimate"]
+    assert estimate["score_jnd"] > 2.0 * found.score > 0.0
+    assert not estimate["is_notable"]
+    assert "the test seems to have the same noise" in found.noise_note
+    assert "--second-reference" not in found.noise_note
 
 
 def test_nothing_is_estimated_without_motion(sequence, monkeypatch):

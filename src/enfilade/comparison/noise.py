@@ -11,6 +11,7 @@ from enfilade.metric import sequence_score
 
 MARGIN = 1.0 / 3.0  # of the floor: a score less than that apart from it is undecided
 NOTABLE_SHARE = 1.0 / 3.0  # of the score
+SHARED_SHARE = 4.0 / 3.0  # of the score: noise that alone would score more is no part of it
 NOTABLE_JND = 0.25  # least score of noise that is mentioned: "next to none" ends there
 
 
@@ -104,17 +105,31 @@ class NoiseEstimate:
     frames: int
 
     def is_notable(self, score: float) -> bool:
-        """Whether the noise alone would have a third or more of a score, JND, and more than 0.25 JND."""
-        return self.score > NOTABLE_JND and self.score >= NOTABLE_SHARE * score
+        """Whether the noise is a third or more of a score, JND, and alone would have more than 0.25 JND."""
+        is_part = NOTABLE_SHARE * score <= self.score <= SHARED_SHARE * score
+        return self.score > NOTABLE_JND and is_part
+
+    def is_shared(self, score: float) -> bool:
+        """Whether the noise alone would score more than 4/3 of a score, JND, and more than 0.25 JND.
+
+        Then the test has the same noise: it is the reference compressed, or a run of one method and seed.
+        """
+        return self.score > NOTABLE_JND and self.score > SHARED_SHARE * score
 
     def sentence(self, score: float) -> str:
-        """The estimate and its remedy, where it is notable beside a score; else empty."""
+        """The estimate and its remedy, where it is notable beside a score, or shared; else empty."""
+        noise = f"reference noise: the reference looks noisy (about {100.0 * self.sigma:.1f} % of white)"
+        if self.is_shared(score):
+            return (
+                f"{noise}, but that noise alone would score about {self.score:.1f} JND, more than the "
+                f"{score:.2f} JND: the test seems to have the same noise, which is then no part of the score"
+            )
         if not self.is_notable(score):
             return ""
         return (
-            f"reference noise: the reference looks noisy (about {100.0 * self.sigma:.1f} % of white), and "
-            f"that noise alone would score about {self.score:.1f} JND of the {score:.2f} JND; render a "
-            "second reference with another --seed and pass it by --second-reference, or take more --spp"
+            f"{noise}, and that noise alone would score about {self.score:.1f} JND, of {score:.2f} JND in "
+            "all; render a second reference with another --seed and pass it by --second-reference, or take "
+            "more --spp"
         )
 
     def to_dict(self, score: float) -> dict[str, Any]:
