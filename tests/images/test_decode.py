@@ -58,7 +58,9 @@ def test_layouts(tmp_path, name):
 
 def test_matrices_and_ranges(tmp_path):
     cases = [{"weights": BT601, "colorspace": matrix} for matrix in (5, 6, 2)]
-    for tags in (*cases, {"size": (720, 1280), "colorspace": 2}, {"full": True}):
+    cases += [{"size": size, "colorspace": 2} for size in ((720, 1280), (536, 1280), (720, 576))]
+    cases += [{"weights": BT601, "size": (576, 720), "colorspace": 2}, {"full": True}]
+    for tags in cases:
         np.testing.assert_allclose(shown(foreign(tmp_path / "a.mkv", **tags)), COLOR, atol=0.01)
 
 

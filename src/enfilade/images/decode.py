@@ -23,7 +23,7 @@ UNSUPPORTED_TRANSFERS = {
     18: "HLG (ARIB STD-B67)",
 }  # fmt: skip
 UNKNOWN_MATRIX = 2
-HD_LINES = 576  # a larger video without a stated matrix has that of BT.709, as in players
+HD_WIDTH, SD_HEIGHT = 1280, 576  # so wide or higher, a video without a stated matrix has BT.709's, as in mpv
 PLANAR_RGB = re.compile(r"gbra?p(\d+le)?")  # FFmpeg's pixel formats
 PLANAR_YCBCR = re.compile(r"yuv[aj]?4(20|22|44)p(\d+le)?")
 DURATION = re.compile(r"(\d+):(\d\d):(\d\d\.\d+)[\0 ]*")  # hours, minutes, seconds
@@ -143,7 +143,8 @@ def _encoded_rgb(file: Path, frame: Any) -> F32:
         g, b, r = planes_of(frame)
         return np.stack([r, g, b], axis=2).astype(np.float32) / np.float32(2.0**bits - 1.0)
     is_full_range = frame.color_range == FULL_RANGE or frame.format.name.startswith("yuvj")
-    weights = MATRICES.get(int(frame.colorspace), BT709 if frame.height > HD_LINES else BT601)
+    is_hd = frame.width >= HD_WIDTH or frame.height > SD_HEIGHT
+    weights = MATRICES.get(int(frame.colorspace), BT709 if is_hd else BT601)
     if int(frame.colorspace) not in (*MATRICES, UNKNOWN_MATRIX):
         raise ImageError(
             f"{file} has the colour matrix {int(frame.colorspace)} of ITU-T H.273; convert it to BT.709"
