@@ -52,6 +52,19 @@ def test_a_plain_spot_in_one_of_many_frames_is_named(sequence):
     assert long.meaning == "next to none overall; up to 11.6 JND in frame 999"
 
 
+def test_a_spot_that_is_visible_is_never_without_a_visible_difference(sequence):
+    good = [textured()]
+    bad = [good[0].copy()]
+    bad[0][20:22, 30:32] *= 0.7
+    found = compared(sequence("bad", bad), sequence("good", good), flow="none")
+    (spot,) = found.frames
+    assert spot.percent_visible > 0.0
+    same = replace(spot, percent_visible=0.0, score=0.0, largest_jnd=0.0)
+    long = replace(found, frames=(*[same] * 999, replace(spot, score=0.01)))
+    assert long.score < 0.005
+    assert long.meaning == f"next to none overall; up to {spot.largest_jnd:.1f} JND in 0001.exr"
+
+
 def test_what_is_nowhere_visible_names_no_frame(sequence):
     faint = textured(level=0.2004)
     found = compared(sequence("faint", [faint]), sequence("good", [textured()]))

@@ -129,11 +129,12 @@ class SequenceDifference:
     @property
     def meaning(self) -> str:
         """The score in words, whether it is undecided, and the frame with the largest visible difference."""
-        words = IDENTICAL if self.is_identical else words_of(self.score)
+        is_visible = any(f.percent_visible for f in self.frames)
+        words = IDENTICAL if self.is_identical else words_of(self.score, is_visible=is_visible)
         if self.noise_floor is not None and self.noise_floor.significance(self.score) == "undecided":
             words += ", undecided"
         worst = max(self.frames, key=lambda f: f.largest_jnd)
-        if not any(f.percent_visible for f in self.frames):
+        if not is_visible:
             return words
         return f"{words}; up to {worst.largest_jnd:.1f} JND in {short_name(worst.name)}"
 
@@ -185,7 +186,7 @@ class SequenceDifference:
         }
 
 
-def words_of(score: float) -> str:
+def words_of(score: float, *, is_visible: bool = False) -> str:
     """The score of sequences that differ in any pixel, in words.
 
     It is that of all pixels and frames together: a small or brief defect has a low score, however plain it
@@ -195,8 +196,12 @@ def words_of(score: float) -> str:
     ----------
     score
         JND, 0 or more.
+    is_visible
+        Whether any pixel of any frame is above 1 JND.
     """
-    return INVISIBLE if score < INVISIBLE_JND else next(text for most, text in WORDS if score <= most)
+    if score < INVISIBLE_JND and not is_visible:
+        return INVISIBLE
+    return next(text for most, text in WORDS if score <= most)
 
 
 def short_name(name: str) -> str:
