@@ -44,9 +44,17 @@ def test_a_test_without_error_is_within_the_noise(sequence, references):
     # The noise of the mean of both is half their difference from each other; the transducer bends it.
     assert found.score == pytest.approx(0.5 * floor["score_jnd"], rel=0.15)
     assert floor["significance"] == "below"
-    assert "a test without any error scores about half of it" in found.noise_note
+    assert "a test without any error scores a third to two thirds of it" in found.noise_note
     assert len(floor["per_frame_jnd"]) == FRAMES
     assert floor["score_jnd"] == compared(references[0], references[1], flow="none").score
+
+
+@pytest.mark.parametrize("sigma", [0.0005, 0.002, 0.05])
+def test_faint_and_strong_noise_leave_a_third_to_two_thirds(sequence, sigma):
+    references = sequence("a", noisy(1, sigma)), sequence("b", noisy(2, sigma))
+    found = against(sequence("clean", [textured()] * FRAMES), references)
+    assert 1.0 / 3.0 < found.score / found.noise_floor.score < 2.0 / 3.0
+    assert "a third to two thirds" in found.noise_note
 
 
 def test_a_test_as_noisy_as_the_references_is_undecided(sequence, references):

@@ -50,8 +50,8 @@ class NoiseFloor:
         -------
         str
             ``undecided`` where the distance from the floor is less than a third of the floor. A test without
-            any error is ``below``, at about half of the floor: the noise of the mean of both references has
-            half the deviation of their difference.
+            any error is ``below``, at a third to two thirds of the floor: the noise of the mean of both
+            references has half the deviation of their difference, of which the score is no linear function.
         """
         if abs(score - self.score) < MARGIN * self.score:
             return "undecided"
@@ -69,7 +69,7 @@ class NoiseFloor:
             case "below":
                 return (
                     f"{floor}; the score of {score:.2f} JND is below that, where noise hides small errors: "
-                    "a test without any error scores about half of it"
+                    "a test without any error scores a third to two thirds of it"
                 )
             case _:
                 return f"{floor}; the score of {score:.2f} JND stands out from it"

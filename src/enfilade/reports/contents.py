@@ -20,7 +20,7 @@ SYMBOLS = {"bar": "■", "line": "━", "dashed": "╌", "triangle": "▼", "squ
 SIGNIFICANCE = {  # of the noise floor
     "above": "above it",
     "undecided": "undecided",
-    "below": "below it; without any error it would be about half of it",
+    "below": "below it; without any error it would be a third to two thirds of it",
 }
 REASONS = (
     "Slow pixels move slowly, so that errors would be noticed; specular pixels show a glossy, mirroring or "
