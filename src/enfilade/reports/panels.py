@@ -69,7 +69,6 @@ def quality_panel(difference: Mapping[str, Any]) -> Panel:
         text,
         tuple(series),
         top=1.1 * max(most, 1.0),
-        level=(1.0, "1 JND: noticed in 3 of 4 cases"),
     )
 
 

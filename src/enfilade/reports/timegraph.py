@@ -10,7 +10,7 @@ import numpy as np
 
 from enfilade.reports import charts
 
-LEAST_TOP_JND = 1.25  # of the axis: the line at 1 JND is always on it
+LEAST_TOP_JND = 1.25  # of the axis: small scores look small
 LEAST_TOP_PERCENT = 1.0
 PARTS = (  # key, name in the legend, colour, mark
     ("score_jnd", "score", charts.INK, "line"),
@@ -45,7 +45,6 @@ def time_figure(found: Mapping[str, Any]) -> charts.Figure:
     for ax, panel in zip(axes, panels, strict=False):
         charts.draw(ax, panel)
         ax.set_ylabel(panel.unit)
-    axes[0].axhline(1.0, color=charts.GREY, linewidth=1.0, zorder=1, label="1 JND: noticed in 3 of 4 cases")
     for ax in axes[:2]:
         charts.legend(ax)
     _draw_bands(figure, axes[2], rows, found["bands_cpd"])
