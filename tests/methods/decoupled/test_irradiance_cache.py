@@ -6,7 +6,7 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from enfilade.arrays import Array3f, UInt, image
+from enfilade.arrays import Array3f, UInt, image, opaque
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.methods.decoupled.irradiance_cache import accumulate, reproject_to, upload
 from enfilade.methods.decoupled.records import IrradianceImage
@@ -62,7 +62,7 @@ def test_points_beyond_the_visible_part_of_a_surface_are_found_up_to_the_least_w
     pixels = np.stack([x, np.full(5, 3.5), np.ones(5)])
     points = geometry.camera.eye[:, None] + geometry.camera.direction_from_pixel @ pixels
     at = Array3f(points.astype(np.float32)), Array3f(0, 0, 1), UInt(1)
-    cache = cache_of_uploaded([uploaded, blank], view=uploaded, min_coverage=min_coverage)
+    cache = cache_of_uploaded([uploaded, blank], view=uploaded, min_coverage=opaque(min_coverage))
     for found, is_found in (cache.lookup(*at), cache.lookup_in_view(*at)):
         assert np.array(is_found).tolist() == [True, True, True, False, False]
         np.testing.assert_allclose(np.array(found)[0], [1, 1, 1, 0, 0], rtol=1e-5)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import drjit as dr
@@ -49,8 +49,9 @@ class IrradianceCache:
         grid is looked up without their light.
     path_guide : PathGuide or None
         Of paths that estimate irradiance.
-    min_coverage : float
-        Bilinear weight of the pixels around a point that show its surface, above which the image does.
+    min_coverage : Float
+        Bilinear weight of the pixels around a point that show its surface, above which the image does. With
+        a literal, the prepass and all else would have kernels of their own.
     depth_weights : DepthWeights
         Of cached irradiance after bounces off specular lobes.
     """
@@ -61,7 +62,7 @@ class IrradianceCache:
     hash_grid: HashGrid | None = None
     soft_only: bool = False
     path_guide: PathGuide | None = None
-    min_coverage: float = MIN_COVERAGE
+    min_coverage: Any = field(default_factory=lambda: opaque(MIN_COVERAGE))
     depth_weights: DepthWeights = UNWEIGHTED
 
     def lookup_in_view(self, position: Any, normal: Any, shape_index: Any) -> tuple[Any, Any]:
@@ -94,7 +95,7 @@ def _mean(
     position: Any,
     normal: Any,
     shape_index: Any,
-    min_coverage: float,
+    min_coverage: Any,
 ) -> tuple[Any, Any]:
     """Weighted mean of images at points (Array3f), and whether any shows them (Bool)."""
     total, weight = Array3f(0), Float(0)

@@ -188,7 +188,7 @@ class ShotContext:
             images=filled_up,
             weights=weights,
             path_guide=self._path_guide(near[0]),
-            min_coverage=PREPASS_COVERAGE,
+            min_coverage=opaque(PREPASS_COVERAGE),
             depth_weights=self._prepass_weights,
         )
 
