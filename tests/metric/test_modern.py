@@ -117,6 +117,23 @@ def test_an_error_in_a_dark_corner_counts_by_its_own_light(modern):
     assert 0.4 < jnd[:, :48].max() / jnd[:, 112:].max() < 1.0
 
 
+@pytest.mark.parametrize("rest_cd_m2", [10.0, 100.0])
+def test_a_bright_area_far_away_does_not_hide_a_wide_error_in_the_dark(rest_cd_m2):
+    # The bright area begins 3 degrees from the error, beyond the adapting surround and the aperture.
+    density = VIEWING.pixels_per_degree
+    metric = Aqm.modern(VIEWING.cropped(320, 160))
+    y, x = np.mgrid[:160, :320] / density
+    blob = 0.3 * np.exp(-((x - 4.0) ** 2 + (y - 2.9) ** 2) / (2.0 * 1.2**2)) * (x < 7.0)
+    found = []
+    for rest in (2.0, rest_cd_m2):
+        reference = np.where(x < 7.0, 2.0, rest)
+        test = reference * (1.0 + blob)
+        jnd = metric.compare(test.astype(np.float32), reference.astype(np.float32)).jnd
+        found.append(jnd[:, x[0] < 5.0].max())
+    assert found[0] > 2.0
+    assert found[1] == pytest.approx(found[0], rel=0.1)
+
+
 def caption(*, still):
     """A caption three pixels high before a background at 25 deg/s, and a fine error in it."""
     velocity = np.zeros((128, 160, 2), np.float32)

@@ -34,8 +34,9 @@ class Aqm:
     Notes
     -----
     Limits: no colour, no fall of acuity away from the gaze. In the paper's mode contrasts are over the mean
-    of the whole image, so errors in dark corners of a bright image count less than they look. Cost: 0.2 to
-    0.3 s of CPU time for a pair of 640x480, about 2 s and 400 MiB for 1920x1080 (`benchmarks/metric.py`).
+    of the whole image, so errors in dark corners of a bright image count less than they look. Cost:
+    docs/metric.md has a table; 0.2 to 0.3 s of CPU time for a pair of 640x480, 1.4 to 2.3 s and 460 MiB for
+    1920x1080 (`benchmarks/metric.py`).
 
     Examples
     --------

@@ -86,8 +86,7 @@ class ModernMetric:
             hold_s=self.viewing.persistence / self.viewing.fps,
         )
         # Transform the difference rather than the test, so that equal images give exactly zero.
-        mean = pair.reference.mean(dtype=np.float64, where=pair.valid) if pair.valid.any() else 0.0
-        spectra = self._bank.spectra(pair.reference - np.float32(mean), pair.test - pair.reference)
+        spectra = self._bank.spectra(pair.reference - luminance, pair.test - pair.reference)
         # Integrate energies, then compare them, masked by those of the same band and its neighbours.
         pool = Pool(len(self.bands), pair.valid, CHANNEL_EXPONENT)
         energies = self._energies(pair, spectra, sensitivity, pool)
