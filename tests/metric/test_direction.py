@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+import scipy.ndimage
 
-from enfilade.metric import Aqm
+import enfilade.metric.direction
+from enfilade.metric import Aqm, Pursuit
 from enfilade.metric.cortex import ORIENTATIONS_DEG, CortexTransform
-from enfilade.metric.direction import MotionDirection, channel_directions
+from enfilade.metric.direction import channel_directions
 from enfilade.viewing import Viewing
 
 SIZE = 128
@@ -69,5 +71,27 @@ def test_a_half_way_grating_is_as_visible_as_its_own_motion_says(monkeypatch):
     tilted, upright = grating(45, 24.0)[0], grating(0, 24.0)[0]
     corrected = ratio()
     assert corrected == pytest.approx(1.0, abs=0.15)
-    monkeypatch.setattr(MotionDirection, "correction", lambda _: np.float32(1.0))
+    monkeypatch.setattr(
+        enfilade.metric.direction, "channel_directions", lambda found: channel_directions(0.0 * found)
+    )
     assert abs(ratio() - 1.0) > 2 * abs(corrected - 1.0)
+
+
+@pytest.mark.parametrize("motion", ["shear", "zoom"])
+def test_a_mean_velocity_at_a_zero_of_the_smear_shows_no_more_than_the_velocities_around_it(motion):
+    # Held frames leave no contrast at some velocities: a ratio of sensitivities there has no bound.
+    viewing = Viewing(640, 480, fps=24.0).cropped(320, 160)
+    metric = Aqm.modern(viewing, pursuit=Pursuit.PURSUIT)
+    y, x = np.mgrid[:160, :320].astype(np.float32)
+    velocity = np.zeros((160, 320, 2), np.float32)
+    if motion == "shear":
+        velocity[..., 0] = 60.0 / 320.0 * x
+    else:
+        velocity[...] = np.stack((x - 160.0, y - 80.0), axis=-1) * np.float32(30.0 / 160.0)
+    reference = np.full((160, 320), 40.0, np.float32)
+    error = scipy.ndimage.gaussian_filter(np.random.default_rng(4).standard_normal((160, 320)), 1.0)
+    test = (reference + 4.0 / error.std() * error).clip(0.0).astype(np.float32)
+    still = metric.compare(test, reference)
+    moving = metric.compare(test, reference, velocity=velocity)
+    assert moving.jnd.max() < 1.05 * still.jnd.max()
+    assert moving.score < still.score

@@ -66,9 +66,7 @@ class Aperture:
         while reduction > self.reduction:
             reduction //= 2
             energy = double(energy, halved_shape(self._image_shape, reduction))
-        while reduction < self.reduction:
-            energy = _pairs(_pairs(energy).T).T
-            reduction *= 2
+        energy = averaged(energy, reduction, self.reduction)
         rows, columns = self.shape
         on_grid = np.zeros(self.shape, dtype=np.float32)
         on_grid[: len(energy), : energy.shape[1]] = energy[:rows, :columns]
@@ -85,6 +83,14 @@ class Aperture:
         for axis in (-2, -1):
             energies = scipy.ndimage.correlate1d(energies, weights, axis, mode="constant")
         return energies
+
+
+def averaged(energy: F32, reduction: int, wanted: int) -> F32:
+    """Average a map at every `reduction`-th pixel over squares, to every `wanted`-th, if that is coarser."""
+    while reduction < wanted:
+        energy = _pairs(_pairs(energy).T).T
+        reduction *= 2
+    return energy
 
 
 def _pairs(fine: F32) -> F32:

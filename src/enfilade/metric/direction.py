@@ -8,11 +8,13 @@ the fans sum to one, so the energies of two neighbouring channels determine the 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from enfilade.metric.aperture import Aperture
+from enfilade.metric.aperture import Aperture, averaged
 from enfilade.metric.cortex import FAN_HALF_WIDTH_DEG, ORIENTATIONS_DEG, Band
-from enfilade.metric.pyramid import halved_shape
+from enfilade.metric.pyramid import double
 from enfilade.metric.sensitivity import FINEST_REDUCTION, ChannelSensitivity
 from enfilade.records import F32
 
@@ -36,12 +38,12 @@ def channel_directions(energies: F32) -> F32:
 
 
 class MotionDirection:
-    """Correction of the integrated energies of one band, accumulated channel by channel.
+    """Integrated energies of one band, weighted by the sensitivity in the direction of its differences.
 
-    Each channel was weighted by the sensitivity in the direction of its centre, pixel by pixel. The
-    correction is the squared ratio of the sensitivity in the direction of the differences to that. The
-    velocity is the mean under the aperture, weighted by visible differences, so that an object at rest
-    before a moving background keeps its own.
+    The direction is that of the difference under the aperture. The sensitivity in that direction is taken
+    at the velocity and luminance of every sample, before the integration: so no energy exceeds that of the
+    sample's contrast at the sample's sensitivity, and an object at rest before a moving background keeps
+    its own.
 
     Parameters
     ----------
@@ -59,42 +61,34 @@ class MotionDirection:
     ) -> None:
         self._sensitivity, self._velocity = sensitivity, velocity
         self._aperture, self._band = aperture, band
-        self._step = max(FINEST_REDUCTION // band.reduction, 1)  # as coarse as velocities
-        self._reduction = self._step * band.reduction
-        self._energies: list[F32] = []
-        self._visible = np.zeros((), dtype=np.float32)
+        # Maps are kept as coarse as velocities, and at the aperture's size at most.
+        self._reduction = max(band.reduction, min(FINEST_REDUCTION, aperture.reduction))
+        self._differences: list[F32] = []
+        self._maps: list[list[F32]] = []
 
-    def accumulate(self, difference: F32, visible: F32) -> None:
-        """Add the next orientation: its difference (h, w), and its energy in units of the threshold's."""
-        energy = np.square(self._thinned(difference))
-        self._energies.append(self._aperture.coarse(energy, self._reduction))
-        self._visible = self._visible + self._thinned(visible)
+    def accumulate(self, difference: F32, energies: Sequence[F32]) -> None:
+        """Add the next orientation: the contrast (h, w) of its difference, and maps of its energies."""
+        thinned = _resampled(difference, self._band.reduction, self._reduction)
+        self._differences.append(self._aperture.coarse(np.square(thinned), self._reduction))
+        self._maps.append([averaged(energy, self._band.reduction, self._reduction) for energy in energies])
 
-    def correction(self) -> F32:
-        """Factors on integrated energies, (6, h', w') float32."""
-        energies = self._aperture.integrate(np.stack(self._energies), self._reduction)
-        directions, velocity = channel_directions(energies), self._mean_velocity()
-        own, centre = (
-            self._sensitivity.towards(self._band, velocity, theta, self._aperture.reduction)
-            for theta in (directions, _centres(3))
+    def integrated(self) -> F32:
+        """Energies in units of the threshold's, integrated, (n, 6, h', w') float32 of n maps."""
+        differences = self._aperture.integrate(np.stack(self._differences), self._reduction)
+        velocity = np.stack([self._sampled(plane, FINEST_REDUCTION) for plane in self._velocity])
+        directions = (
+            self._sampled(theta, self._aperture.reduction) for theta in channel_directions(differences)
         )
-        own /= np.maximum(centre, np.float32(FAINTEST))
-        return np.square(own, out=own)
+        weights = self._sensitivity.towards(self._band, velocity, directions, self._reduction)
+        found = np.empty((len(self._maps[0]), len(self._maps), *self._aperture.shape), dtype=np.float32)
+        for index, (weight, maps) in enumerate(zip(weights, self._maps, strict=True)):
+            power = np.square(weight)
+            found[:, index] = [self._aperture.coarse(power * energy, self._reduction) for energy in maps]
+        return self._aperture.integrate(found, self._band.reduction)
 
-    def _mean_velocity(self) -> F32:
-        """Mean velocity under the aperture, weighted by visible differences, (2, h', w')."""
-        step = self._reduction // FINEST_REDUCTION
-        weight = self._visible + np.float32(FAINTEST)
-        velocity = (_sized(plane[::step, ::step], weight.shape) for plane in self._velocity)
-        planes = (weight, *(weight * plane for plane in velocity))
-        on_grid = np.stack([self._aperture.coarse(plane, self._reduction) for plane in planes])
-        total, across, down = self._aperture.integrate(on_grid, self._reduction)
-        total = np.maximum(total, np.float32(FAINTEST))
-        return np.stack((across / total, down / total))
-
-    def _thinned(self, channel: F32) -> F32:
-        shape = halved_shape(channel.shape, self._step)
-        return _sized(channel[:: self._step, :: self._step], shape)
+    def _sampled(self, plane: F32, reduction: int) -> F32:
+        """A map at every `reduction`-th pixel at the samples of energies."""
+        return _sized(_resampled(plane, reduction, self._reduction), self._maps[0][0].shape)
 
 
 def _centres(dimensions: int) -> F32:
@@ -102,8 +96,18 @@ def _centres(dimensions: int) -> F32:
     return np.array(ORIENTATIONS_DEG, dtype=np.float32).reshape(-1, *(1,) * (dimensions - 1))
 
 
+def _resampled(samples: F32, reduction: int, wanted: int) -> F32:
+    """A map at every `reduction`-th pixel at every `wanted`-th: thinned, or interpolated."""
+    if wanted >= reduction:
+        return samples[:: wanted // reduction, :: wanted // reduction]
+    while reduction > wanted:
+        reduction //= 2
+        samples = double(samples, (2 * samples.shape[0] - 1, 2 * samples.shape[1] - 1))
+    return samples
+
+
 def _sized(samples: F32, shape: tuple[int, ...]) -> F32:
-    """Samples of a map, the last repeated where the grid has one more."""
+    """Samples of a map of a shape, the last repeated where that has more."""
     if samples.shape == shape:
         return samples
     missing = [(0, max(wanted - has, 0)) for has, wanted in zip(samples.shape, shape, strict=True)]

@@ -111,27 +111,27 @@ class ModernMetric:
         """Integrated energies of each band, (3, n, h', w') as `Transducer` takes them."""
         found = []
         for band in self.bands:
-            direction = None
+            area = pool.area(band.reduction)
+            channels = self._bank.channels(spectra, band, pair.valid)
             if pair.velocity is not None and not band.is_base:
                 direction = MotionDirection(sensitivity, pair.velocity, self._aperture, band)
-            area = pool.area(band.reduction)
+                contrast = sensitivity.contrast(band)
+                for channel in channels:
+                    difference = channel.counted * contrast
+                    direction.accumulate(
+                        difference, _energies(channel.reference * contrast, difference, area)
+                    )
+                found.append(direction.integrated())
+                continue
             energies = np.empty((3, len(band.orientations), *self._aperture.shape), dtype=np.float32)
-            channels = self._bank.channels(spectra, band, pair.valid)
             for index, (channel, weight) in enumerate(zip(channels, sensitivity.weights(band), strict=True)):
                 # Express contrasts in units of the threshold; the uniform part stands still.
-                reference, difference = channel.reference * weight, channel.counted * weight
+                difference = channel.counted * weight
                 if channel.uniform is not None:
                     difference += channel.uniform * sensitivity.at_rest(band)
-                maps = energy_difference(reference, np.add(reference, difference, out=difference))
-                if area is not None:
-                    np.multiply(maps[2], area, out=maps[2])
-                if direction is not None:
-                    direction.accumulate(channel.counted, maps[2])
+                maps = _energies(channel.reference * weight, difference, area)
                 energies[:, index] = [self._aperture.coarse(energy, band.reduction) for energy in maps]
-            energies = self._aperture.integrate(energies, band.reduction)
-            if direction is not None:
-                energies *= direction.correction()
-            found.append(energies)
+            found.append(self._aperture.integrate(energies, band.reduction))
         return found
 
     def _csf(self, frequency_cpd: float, velocity_deg_s: F64, luminance_cd_m2: F64) -> F64:
@@ -149,3 +149,11 @@ class ModernMetric:
             for f in (rho, np.asarray(band.centre_cpp * density))
         )
         return np.asarray(here / centre, dtype=np.float32)
+
+
+def _energies(reference: F32, difference: F32, area: F32 | None) -> tuple[F32, F32, F32]:
+    """Energies of `energy_difference`, the difference over the valid area only; overwrites the reference."""
+    maps = energy_difference(reference, reference + difference)
+    if area is not None:
+        np.multiply(maps[2], area, out=maps[2])
+    return maps

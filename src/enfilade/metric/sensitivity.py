@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -146,17 +146,27 @@ class ChannelSensitivity:
         """Weight of patterns at rest on the retina."""
         return self._weight(self._table.row(band)[self._luminance(_reduction(band))], band)
 
-    def towards(self, band: Band, velocity: F32, theta_deg: F32, reduction: int) -> F32:
-        """Sensitivity to motions (2, h, w) deg/s of patterns of directions (n, h, w) at a reduced size."""
+    def contrast(self, band: Band) -> F32:
+        """Contrast of a response of one, () or (h, w) float32 at the band's size."""
+        return self._contrast.at(band.reduction)
+
+    def towards(self, band: Band, velocity: F32, thetas_deg: Iterable[F32], reduction: int) -> Iterator[F32]:
+        """Sensitivity to patterns of each of several maps of directions, (h, w) degrees, at a reduced size.
+
+        They move at `velocity`, (2, h, w) deg/s. Of the samples the last row or column may be missing.
+        """
         row, rho = self._table.row(band), self._table.frequency_cpd(band)
-        best = np.zeros((), dtype=np.float32)
-        for moved, smear in (self._motion(velocity, eye) for eye in self._eyes):
-            index = self._table.speed_index(channel_speed(moved, theta_deg))
-            found = row.take(index + self._luminance(reduction))
-            if smear is not None:
-                found *= smeared_contrast(smear, theta_deg, rho)
-            best = np.maximum(best, found)
-        return best
+        rows, columns = velocity.shape[1:]
+        luminance = self._luminance(reduction)[:rows, :columns]
+        motions = [self._motion(velocity, eye) for eye in self._eyes]
+        for theta in thetas_deg:
+            best = np.zeros((), dtype=np.float32)
+            for moved, smear in motions:
+                found = row.take(self._table.speed_index(channel_speed(moved, theta)) + luminance)
+                if smear is not None:
+                    found *= smeared_contrast(smear, theta, rho)
+                best = np.maximum(best, found)
+            yield best
 
     def _motion(self, velocity: F32, eye: Pursuit) -> tuple[F32, F32 | None]:
         return retinal_velocity(velocity, eye), held_smear(velocity, eye, self._hold_s)
