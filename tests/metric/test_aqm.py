@@ -59,6 +59,16 @@ def test_a_local_defect_lights_up_there_only(aqm, textured, defect):
     assert jnd[far].max() < (0.15 if aqm.has_transient else 0.08) * jnd.max()
 
 
+def test_the_score_lies_between_the_largest_band_and_the_sum_of_all(aqm):
+    reference = np.full((128, 160), 40.0, np.float32)
+    test = reference.copy()
+    test[60:68, 76:84] = 60.0
+    found = aqm.compare(test, reference)
+    bands = found.steady.band_jnd
+    # Maps of coarse bands are interpolated, which costs a few percent.
+    assert 0.95 * max(bands) < found.score < 1.05 * sum(bands)
+
+
 @pytest.mark.parametrize("size", [0.45, 0.55])
 @pytest.mark.parametrize("speed", [0.0, 5.0])
 def test_where_most_of_a_frame_is_brighter_the_rest_is_not_seen(aqm, size, speed):

@@ -20,11 +20,12 @@ class Part:
     score : float
         As in `Comparison`, of this part alone, JND.
     band_jnd : tuple of float
-        Per radial band, finest first and base last: J of the band's channels pooled over
-        orientations and, as a mean, over the valid area, (mean sum_l J_kl^b)^(1/b), in JND; b is
-        the exponent of pooling over channels, 3.5 in the paper's mode and 1 in the modern one.
-        In the paper's mode the bands add up to the score, score^3.5 = sum_k band_jnd_k^3.5, but for
-        interpolation (a few percent).
+        Per radial band, finest first and base last: J of the band's channels, pooled over the valid
+        pixels as the score is, (mean J_k^3.5)^(1/3.5), in JND; J_k = (sum_l J_kl^b)^(1/b) over
+        orientations, and b is the exponent of pooling over channels, 3.5 in the paper's mode and 1 in the
+        modern one. But for interpolation (a few percent), the bands add up to the score in the paper's
+        mode, score^3.5 = sum_k band_jnd_k^3.5; in the modern mode the score lies between the largest band
+        and the sum of all.
     """
 
     score: float

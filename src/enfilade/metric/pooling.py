@@ -50,14 +50,19 @@ class Pool:
         return None if self._area is None else self._area.at(reduction)
 
     def add(self, level: int, power: F32, reduction: int, *, is_transient: bool = False) -> None:
-        """Add J^b of one or more channels of a level, a map at every `reduction`-th pixel."""
+        """Add J^b of one or more channels of a level, a map at every `reduction`-th pixel.
+
+        `Part.band_jnd` is exact where b is 3.5, or where all channels of a level are added at once.
+        """
         sums, area = self._sums[is_transient], self.area(reduction)
         sums[reduction] = sums[reduction] + power if reduction in sums else power
+        ratio = POOLING_EXPONENT / self._exponent
+        pooled = power if ratio == 1.0 else power.astype(np.float64) ** ratio
         if area is None:
-            mean = float(power.mean(dtype=np.float64))
+            mean = float(pooled.mean(dtype=np.float64))
         else:
             weight = float(area.sum(dtype=np.float64))
-            mean = float(np.vdot(area, power)) / weight if weight else 0.0
+            mean = float(np.vdot(area, pooled)) / weight if weight else 0.0
         self._band_sums[is_transient][level - 1] += mean
 
     def comparison(self) -> Comparison:
@@ -100,4 +105,4 @@ class Pool:
         return float((total / count) ** (1.0 / POOLING_EXPONENT))
 
     def _band_jnd(self, kind: bool) -> tuple[float, ...]:
-        return tuple(total ** (1.0 / self._exponent) for total in self._band_sums[kind])
+        return tuple(total ** (1.0 / POOLING_EXPONENT) for total in self._band_sums[kind])
