@@ -228,6 +228,23 @@ def test_motion_beside_a_rest_is_the_mean_with_no_motion(tmp_path):
     assert [f.velocity_deg_s for f in found.frames] == pytest.approx(speed, rel=1e-5)
 
 
+@pytest.mark.parametrize("kind", ["own", "motion"])
+def test_layers_of_both_directions_tell_what_was_covered(tmp_path, kind):
+    """A square that is too bright uncovers four pixels of the background in each frame."""
+    folders = {}
+    for name, level in (("t", 0.35), ("r", 0.3)):
+        folder = folders[name] = tmp_path / name
+        folder.mkdir()
+        for number in range(3):
+            image, motion = textured(), np.zeros((*SIZE, 2), np.float32)
+            where = np.s_[10:30, 4 + 4 * number : 24 + 4 * number]
+            image[where], motion[where] = level, (4.0, 0.0)
+            layers = {"motion": motion} if kind == "motion" else {"forward": motion, "backward": -motion}
+            write_exr(folder / f"{number:04}.exr", {"RGB": image, **layers})
+    transient = [f.transient.score for f in compared(folders["t"], folders["r"]).frames]
+    assert max(transient) < 0.01 if kind == "own" else min(transient[1:]) > 0.3
+
+
 def flickering(images):
     """Every other frame has a dark square."""
     faulty = [image.copy() for image in images]

@@ -89,6 +89,33 @@ def test_an_error_that_sticks_to_a_moving_surface_does_not_flicker(metric, scene
     assert still[-1].transient.score > 0.1
 
 
+def test_a_disoccluded_surface_does_not_flicker(metric, scene):
+    # A square that is 15 % too bright uncovers 8 pixels of a textured background in each frame.
+    def frame(index):
+        is_square = np.zeros(SHAPE, bool)
+        is_square[40:90, 30 + 8 * index : 80 + 8 * index] = True
+        reference = np.where(is_square, np.float32(60.0), scene)
+        test = np.where(is_square, np.float32(69.0), reference)
+        flow = np.zeros((*SHAPE, 2), np.float32)
+        flow[is_square, 0] = 8.0
+        return test, reference, flow
+
+    found = {}
+    for has_forward in (False, True):
+        for index in range(3):
+            test, reference, flow = frame(index)
+            compared = metric.compare(
+                test,
+                reference,
+                backward_flow_px=-flow,
+                forward_flow_px=flow if has_forward else None,
+                is_cut=index == 0,
+            )
+        found[has_forward] = compared.transient.score
+    assert found[False] > 1.0
+    assert found[True] < 1e-3
+
+
 def test_a_cut_has_no_frame_before_it(metric, scene):
     worse = scene * np.float32(0.8)
     metric.compare(worse, scene, is_cut=True)
@@ -132,6 +159,7 @@ def test_sequence_score_lies_between_mean_and_worst():
         sequence_score([])
 
 
-def test_bad_flow_is_refused(metric, scene):
-    with pytest.raises(InputError, match=r"backward_flow_px.*shape"):
-        metric.compare(scene, scene, backward_flow_px=np.zeros((3, 4, 2), np.float32))
+@pytest.mark.parametrize("name", ["backward_flow_px", "forward_flow_px"])
+def test_bad_flow_is_refused(metric, scene, name):
+    with pytest.raises(InputError, match=rf"{name}.*shape"):
+        metric.compare(scene, scene, **{name: np.zeros((3, 4, 2), np.float32)})

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from enfilade.metric.transient import error_change, flicker_sensitivity, moved
+from enfilade.metric.transient import error_change, flicker_sensitivity, moved, was_visible
 
 
 def test_moved_is_exact_on_a_ramp():
@@ -29,6 +29,16 @@ def test_change_follows_the_surface():
     edge[:, 0] = 1.0
     assert not error_change(edge, here, flow)[:, 0].any()
     assert not error_change(edge, here, np.float32(0.5) * flow)[:, 0].any()
+
+
+def test_outlines_between_pixels_are_not_taken_for_disocclusions():
+    # A square moves by 2.5 pixels before a background at rest: its outline was visible all around.
+    is_before, is_now = np.zeros((2, 20, 30), bool)
+    is_before[5:15, 5:15] = is_now[5:15, 8:18] = True
+    forward, backward = np.zeros((2, 20, 30, 2), np.float32)
+    forward[is_before, 0], backward[is_now, 0] = 2.5, -2.5
+    found = was_visible(forward, backward)
+    np.testing.assert_array_equal(found, ~(is_before & ~is_now))
 
 
 def test_flicker_is_seen_best_at_low_spatial_frequency():

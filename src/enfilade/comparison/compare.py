@@ -236,6 +236,7 @@ def _compared(aqm: SequenceAqm, pair: Pair, moved: Moved, velocity: F32 | None) 
             pair.reference_cd_m2,
             velocity=velocity,
             backward_flow_px=moved.backward,
+            forward_flow_px=moved.forward,
             is_cut=moved.is_cut,
         )
     except InputError as error:

@@ -36,12 +36,15 @@ class Moved:
         None: nothing moves.
     backward : (H, W, 2) float32 or None
         To the last frame, pixels; None where nothing moves or there is none.
+    forward : (H, W, 2) float32 or None
+        To the next frame, pixels; None where it is unknown, or less exact than the outline of an object.
     is_cut : bool
         Whether a new shot begins.
     """
 
     motion: F32 | None = None
     backward: F32 | None = None
+    forward: F32 | None = None
     is_cut: bool = False
 
 
@@ -187,10 +190,6 @@ def _apart(flow: Flow, earlier: Flow) -> tuple[Flow, Flow]:
     )
 
 
-def _moved(flow: Flow, *, is_cut: bool) -> Moved:
-    return Moved(flow.motion, None if is_cut else flow.backward, is_cut)
-
-
 class _FromLayers:
     kind = "layers"
 
@@ -220,10 +219,15 @@ class _FromLayers:
                 is_cut = self._is_cut(pair.index, flow, pair.reference_grey, before.reference_grey)
                 if is_cut and self._has_unknown_cuts:
                     flow, earlier = _apart(flow, earlier)
-                yield before, _moved(earlier, is_cut=was_cut)
+                yield before, self._moved(earlier, is_cut=was_cut)
             waiting = pair, flow, is_cut
         if waiting is not None:
-            yield waiting[0], _moved(waiting[1], is_cut=waiting[2])
+            yield waiting[0], self._moved(waiting[1], is_cut=waiting[2])
+
+    def _moved(self, flow: Flow, *, is_cut: bool) -> Moved:
+        # Vectors that lead one way are too inexact the other way for a test of disocclusion.
+        forward = flow.forward if flow.has_forward and not self._kind.is_forward_only else None
+        return Moved(flow.motion, None if is_cut else flow.backward, forward, is_cut)
 
     @property
     def _has_unknown_cuts(self) -> bool:
@@ -283,7 +287,7 @@ class _Estimated:
         following = None if index + 1 in starts else after
         flow = self._estimator.flow(now, previous, following)
         is_cut = index > 0 and not flow.has_backward if self._starts is None else index in starts
-        return Moved(flow.motion, flow.backward if flow.has_backward else None, is_cut)
+        return Moved(flow.motion, flow.backward if flow.has_backward else None, is_cut=is_cut)
 
 
 class _Still:

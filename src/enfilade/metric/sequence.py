@@ -30,6 +30,7 @@ class SequenceAqm:
     def __init__(self, aqm: Aqm) -> None:
         self.aqm = aqm
         self._last: F32 | None = None
+        self._forward: F32 | None = None
 
     def compare(
         self,
@@ -38,6 +39,7 @@ class SequenceAqm:
         *,
         velocity: F32 | None = None,
         backward_flow_px: F32 | None = None,
+        forward_flow_px: F32 | None = None,
         is_cut: bool = False,
     ) -> Comparison:
         """Compare the next frame of both sequences.
@@ -52,6 +54,10 @@ class SequenceAqm:
         backward_flow_px : (H, W, 2) float32, optional
             From each pixel to its surface's place in the last frame, pixels: for an image that
             moves to the right x is negative. None: the surface was at the same pixel.
+        forward_flow_px : (H, W, 2) float32, optional
+            From each pixel to its surface's place in the next frame, pixels: with it, surfaces that are
+            disoccluded in the next frame have no change. None: they count with the error of what
+            covered them.
         is_cut : bool
             Whether this frame begins a shot and has no last frame. The first frame always does.
 
@@ -64,21 +70,22 @@ class SequenceAqm:
         Raises
         ------
         InputError
-            As `Aqm.compare`; `backward_flow_px` has the wrong type or shape, or is not finite.
+            As `Aqm.compare`; a flow has the wrong type or shape, or is not finite.
         """
         viewing = self.aqm.viewing
         shape = viewing.height_px, viewing.width_px
-        if backward_flow_px is not None:
-            check_map("backward_flow_px", backward_flow_px, (*shape, 2), None, is_signed=True)
-            if velocity is None:
-                velocity = viewing.velocity_deg_s(-backward_flow_px)
+        for name, flow in (("backward_flow_px", backward_flow_px), ("forward_flow_px", forward_flow_px)):
+            if flow is not None:
+                check_map(name, flow, (*shape, 2), None, is_signed=True)
+        if backward_flow_px is not None and velocity is None:
+            velocity = viewing.velocity_deg_s(-backward_flow_px)
         check_pair(shape, test, reference, velocity, None)
         change = None
         if self.aqm.has_transient:
             error = test - reference
             if self._last is not None and not is_cut:
-                change = error_change(error, self._last, backward_flow_px)
-            self._last = error
+                change = error_change(error, self._last, backward_flow_px, self._forward)
+            self._last, self._forward = error, forward_flow_px
         return self.aqm.compare(test, reference, velocity=velocity, change=change)
 
 

@@ -6,10 +6,13 @@ sticks to the surface. The transient channel of vision (castleCSF) gets the chan
 Limits: the error of the frame itself counts as steady besides, as if the film were stopped there, so that
 an error that comes and goes is never scored below one that stays. The eye is taken to follow the surface,
 and nothing masks the change. The last error is fetched bilinearly, which blurs it, so that a steady fine
-error on a surface that moves by fractions of a pixel counts a little as change.
+error on a surface that moves by fractions of a pixel counts a little as change. Backward vectors of
+disoccluded surfaces lead to what covered them; only with the last frame's forward vectors these are found.
 """
 
 from __future__ import annotations
+
+import itertools
 
 import numpy as np
 
@@ -20,6 +23,7 @@ from enfilade.records import F32, F64, Mask
 from enfilade.viewing import Viewing
 
 FREQUENCIES = 64  # samples of temporal frequency; the integrand is smooth
+AGREEMENT_PX = 1.0  # our choice: forward and backward vectors of a surface differ by less
 LUMINANCE_KNOTS = np.geomspace(1e-3, 1e4, 64)  # cd/m2, interpolated between on logarithmic axes
 
 
@@ -57,7 +61,32 @@ def moved(image: F32, flow_px: F32) -> tuple[F32, Mask]:
     return np.where(is_inside, upper, np.float32(0.0)), is_inside
 
 
-def error_change(error: F32, before: F32, backward_flow_px: F32 | None) -> F32:
+def was_visible(forward_flow_px: F32, backward_flow_px: F32) -> Mask:
+    """Whether each surface was visible in the last frame, (H, W) bool.
+
+    One of the four pixels around its place in the last frame must have moved as it did. (Their mean would
+    fail at the outlines of what moves.)
+
+    Parameters
+    ----------
+    forward_flow_px : (H, W, 2) float32
+        Of the last frame: from each pixel to its place in this one, pixels.
+    backward_flow_px : (H, W, 2) float32
+        Of this frame: from each pixel to its place in the last one.
+    """
+    height, width = backward_flow_px.shape[:2]
+    across = np.clip(backward_flow_px[..., 0] + np.arange(width), 0, width - 1)
+    down = np.clip(backward_flow_px[..., 1] + np.arange(height)[:, None], 0, height - 1)
+    found = np.zeros((height, width), np.bool_)
+    for to_row, to_column in itertools.product((np.floor, np.ceil), repeat=2):
+        forward = forward_flow_px[to_row(down).astype(np.intp), to_column(across).astype(np.intp)]
+        found |= np.abs(forward + backward_flow_px).max(axis=-1) < AGREEMENT_PX
+    return found
+
+
+def error_change(
+    error: F32, before: F32, backward_flow_px: F32 | None, forward_flow_px: F32 | None = None
+) -> F32:
     """Error of a frame less that of the last frame at the same surface.
 
     Parameters
@@ -66,16 +95,20 @@ def error_change(error: F32, before: F32, backward_flow_px: F32 | None) -> F32:
         test - reference of this frame and of the last, cd/m2.
     backward_flow_px : (H, W, 2) float32 or None
         From each surface to its place in the last frame, pixels; None: nothing moved.
+    forward_flow_px : (H, W, 2) float32 or None
+        Of the last frame; finds surfaces that it did not show. None: it showed all.
 
     Returns
     -------
     (H, W) float32
-        cd/m2; 0 where the surface was outside.
+        cd/m2; 0 where the surface was outside or covered.
     """
     if backward_flow_px is None:
         return error - before
-    last, is_inside = moved(before, backward_flow_px)
-    return np.where(is_inside, error - last, np.float32(0.0))
+    last, is_known = moved(before, backward_flow_px)
+    if forward_flow_px is not None:
+        is_known &= was_visible(forward_flow_px, backward_flow_px)
+    return np.where(is_known, error - last, np.float32(0.0))
 
 
 def flicker_sensitivity(frequency_cpd: float, fps: float, luminance_cd_m2: F64) -> F64:
