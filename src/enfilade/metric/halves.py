@@ -57,7 +57,7 @@ class HalvesAqm:
         check_mask_slope(mask_slope)
         self.viewing = viewing
         self._mask_slope = mask_slope
-        self._bank = ChannelBank(viewing)
+        self._bank = ChannelBank(viewing, oversampling=1.0)
         gain = 10.0 ** (GAIN_DB / 20.0)
         self._table = SensitivityTable(
             lambda rho, velocity, _: gain * spatiovelocity_sensitivity(rho, velocity),

@@ -40,7 +40,7 @@ class Paper(Method):
     """The published method."""
 
     name = "paper"
-    revision = 9
+    revision = 10
     settings = (
         TraceSettings,
         SamplingSettings,
