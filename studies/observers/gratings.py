@@ -109,7 +109,10 @@ STIMULI: dict[str, Callable[[Grating], Stimulus]] = {
 
 
 def _plane(size_px: int, pixels_per_degree: float) -> tuple[F64, F64]:
-    """Degrees from the centre: x to the right, y down."""
+    """Degrees from the centre, between four pixels: x to the right, y down.
+
+    Unlike `screen.plane`, which centres on a pixel and makes the fields half a pixel too wide.
+    """
     steps = (np.arange(size_px) - 0.5 * (size_px - 1)) / pixels_per_degree
     x, y = np.meshgrid(steps, steps)
     return x, y

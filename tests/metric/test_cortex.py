@@ -26,7 +26,7 @@ def every_channel(cortex, images):
 
 def test_bands_and_channels_at_28_pixels_per_degree():
     assert sum(len(band.orientations) for band in bands(PPD)) == 31
-    # Geometric mean of the half-amplitude frequencies, cpd; the base: power-weighted mean.
+    # Geometric mean of the half-power frequencies, cpd; the base: power-weighted mean.
     centres = [band.centre_cpp * PPD for band in bands(PPD)]
     assert centres == pytest.approx([16.6, 9.9, 4.9, 2.5, 0.90, 0.22], rel=0.015)
 

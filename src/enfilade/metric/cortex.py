@@ -46,7 +46,7 @@ class Band:
     level : int
         1 for the finest, counting up to the base.
     low_cpp, high_cpp : float
-        Frequencies of half amplitude, cycles per pixel; `low_cpp` is 0 in the base.
+        Frequencies of half power before `tilt`, cycles per pixel; `low_cpp` is 0 in the base.
     centre_cpp : float
         Geometric mean of the two; in the base the power-weighted mean.
     cutoff_cpp : float

@@ -49,8 +49,8 @@ def spatiovelocity_sensitivity(
     and it depends neither on luminance nor on size. It is kept as published.
     """
     speed = velocity_deg_s * C2
-    octaves = np.abs(np.log10(speed / KNEE_DEG_S))
-    level = (octaves * octaves * octaves * LEVEL_RISE + LEVEL) * speed
+    decades = np.abs(np.log10(speed / KNEE_DEG_S))
+    level = (decades * decades * decades * LEVEL_RISE + LEVEL) * speed
     rise = C0 * (2.0 * math.pi * C1 * frequency_cpd) ** 2
     decay = 4.0 * math.pi * C1 * frequency_cpd / DECAY
     sensitivity: Quantity = level * np.exp((speed + DECAY_OFFSET_DEG_S) * -decay) * rise
