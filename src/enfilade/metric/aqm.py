@@ -35,7 +35,7 @@ class Aqm:
     -----
     Limits: no colour, no fall of acuity away from the gaze. In the paper's mode contrasts are over the mean
     of the whole image, so errors in dark corners of a bright image count less than they look. Cost:
-    docs/metric.md has a table; 0.2 to 0.3 s of CPU time for a pair of 640x480, 1.4 to 2.3 s and 460 MiB for
+    docs/metric.md has a table; 0.2 to 0.3 s of CPU time for a pair of 640x480, 1.4 to 2.3 s and 400 MiB for
     1920x1080 (`benchmarks/metric.py`).
 
     Examples
