@@ -245,7 +245,7 @@ def test_the_error_of_the_operating_system_is_kept(scene, monkeypatch, number):
         ),
     ],
 )
-def test_what_is_refused_says_what_to_write(scene, body, words):
+def test_refusals_name_the_replacement(scene, body, words):
     refused(scene(BALL + body), words)
 
 
@@ -254,16 +254,21 @@ def test_what_is_refused_says_what_to_write(scene, body, words):
     [
         '<emitter type="directional" id="sun">{}</emitter>',
         '<emitter type="sunsky" id="sun"><vector name="sun_direction" x="0.3" y="1" z="0.2"/>{}</emitter>',
+        '<emitter type="envmap" id="sun"><string name="filename" value="sky.pfm"/>{}</emitter>',
     ],
 )
-def test_the_scale_of_an_emitter_changes_no_light(scene, emitter):
+@pytest.mark.parametrize("after", ["", '<rotate x="1" angle="-70"/>'])
+def test_the_scale_of_an_emitter_changes_no_light(scene, emitter, after):
     def mean(transform):
-        place = f'<transform name="to_world">{transform}<rotate x="1" angle="-70"/></transform>'
+        place = f'<transform name="to_world"><rotate y="1" angle="90"/>{transform}{after}</transform>'
         renderer = MitsubaRenderer(scene('<shape type="sphere"/>' + emitter.format(place)))
         camera = Camera(look_at((0, 0, 6), (0, 0, 0)), 25, 8, 8)
         key, pixels = RandomKey(1, 0, Purpose.REFERENCE), np.arange(64, dtype=np.uint32)
         return renderer.trace(camera, pixels, key, spp=16).color.mean(), renderer.describe().notes
 
+    sky = np.full((4, 8, 3), 0.2, np.float32)
+    sky[1, 3] = 9.0
+    (scene("").parent / "sky.pfm").write_bytes(b"PF\n8 4\n-1.0\n" + sky.tobytes())
     plain, none = mean("")
     scaled, notes = mean('<scale x="2" y="3" z="2"/>')
     assert none == ()

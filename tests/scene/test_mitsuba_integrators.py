@@ -38,6 +38,8 @@ def of_integrator(folder, integrator, inside=DIFFUSE):
         (f'<integrator type="path">{THREE}</integrator>', DIFFUSE, "depth 3 (--max-depth 5 or"),
         (HIDDEN.format("path"), DIFFUSE, ""),
         (AOVS, DIFFUSE, ""),
+        (f'<integrator type="moment">{HIDDEN.format("path")}</integrator>', DIFFUSE, ""),
+        ('<integrator type="moment"><integrator type="direct"/></integrator>', DIFFUSE, "DirectIntegrator"),
         ('<integrator type="volpath"/>', f'<bsdf type="null"/>{FOG}', "participating media"),
         ('<integrator type="path"/>', f'<bsdf type="dielectric"/>{FOG}', ""),  # which it never looks at
         ('<integrator type="volpath"/>', '<bsdf type="thindielectric"/>', ""),
@@ -147,12 +149,12 @@ def test_hidden_emitters_are_not_seen_and_give_light(tmp_path):
         ('<shape type="sphere"><float name="radius" value="0.01"/></shape>', "measures 0.0346: shadows"),
         ('<shape type="sphere"><bsdf type="polarizer"/></shape>', "no polarization here"),
         (
-            f'<integrator type="volpath"/><shape type="sphere"><bsdf type="null"/>{FOG}</shape>',
+            '<integrator type="volpath"/>{0}<sensor type="perspective"><medium type="homogeneous"/></sensor>',
             "taken to be in",
         ),
     ],
 )
-def test_what_frames_do_not_show_right_is_noted(tmp_path, body, words):
+def test_limitations_are_noted(tmp_path, body, words):
     file = tmp_path / "scene.xml"
     inside = body.format(placed("sphere", "ball", (0, 0, 0), DIFFUSE))
     file.write_text(f'<scene version="3.0.0">{inside}<emitter type="constant"/></scene>')

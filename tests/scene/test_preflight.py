@@ -61,10 +61,10 @@ NEAR = '<float name="near_clip" value="{}"/>'
                 '<shape type="sphere"><transform name="to_world"><scale x="2"/></transform></shape>'
                 '<emitter type="constant"/>'
             ),
-            ["Mitsuba warns of a Sphere: 'to_world' transform shouldn't contain non-uniform"],
+            ["Mitsuba warns (Sphere): 'to_world' transform shouldn't contain non-uniform"],
         ),
         (f'<integrator type="path"/>{FOG}', ["participating media"]),
-        (f'<integrator type="volpath"/>{FOG}', ["the camera is taken to be in the medium"]),
+        (f'<integrator type="volpath"/>{FOG}', []),
         (
             f'{BALL}<shape type="disk" id="slit"><emitter type="directionalarea"/></shape>',
             ["the emitter of slit is a directionalarea"],

@@ -215,11 +215,11 @@ class _FromLayers:
             last = read
             is_cut = False
             if waiting is not None:
-                before, earlier, was_cut = waiting
-                is_cut = self._is_cut(pair.index, flow, pair.reference_grey, before.reference_grey)
+                _, earlier, was_cut = waiting
+                is_cut = self._is_cut(pair.index, flow, pair.reference_grey, waiting[0].reference_grey)
                 if is_cut and self._has_unknown_cuts:
                     flow, earlier = _apart(flow, earlier)
-                yield before, self._moved(earlier, is_cut=was_cut)
+                yield waiting[0], self._moved(earlier, is_cut=was_cut)
             waiting = pair, flow, is_cut
         if waiting is not None:
             yield waiting[0], self._moved(waiting[1], is_cut=waiting[2])

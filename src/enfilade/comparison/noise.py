@@ -11,7 +11,9 @@ from enfilade.metric import sequence_score
 
 MARGIN = 1.0 / 3.0  # of the floor: a score less than that apart from it is undecided
 NOTABLE_SHARE = 1.0 / 3.0  # of the score
-SHARED_SHARE = 4.0 / 3.0  # of the score: noise that alone would score more is no part of it
+SHARED_SHARE = (
+    4.0 / 3.0
+)  # of the score: noise that alone would score more is no part of it; estimates are low
 NOTABLE_JND = 0.25  # least score of noise that is mentioned: "next to none" ends there
 
 
@@ -138,5 +140,6 @@ class NoiseEstimate:
             "score_jnd": self.score,
             "sigma_percent": 100.0 * self.sigma,
             "is_notable": self.is_notable(score),
+            "is_shared": self.is_shared(score),
             "frames": self.frames,
         }

@@ -140,7 +140,7 @@ class SequenceDifference:
 
     @property
     def noise_note(self) -> str:
-        """What the noise of the reference means for the score; empty where it is hardly part of it."""
+        """Meaning of the reference's noise for the score; empty where there is little of it."""
         if self.is_identical:
             return ""
         noise = self.noise_floor or self.noise_estimate

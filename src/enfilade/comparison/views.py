@@ -19,6 +19,7 @@ def open_views(sides: Sequence[Side]) -> tuple[list[View | None], list[str]]:
     """Open the views of a comparison.
 
     A run has the view of its video. Frames of no run have that of the other side, and references share one.
+    If a view can't be opened, as after a move of its configuration, all sides have the sRGB curve.
 
     Parameters
     ----------
@@ -46,11 +47,11 @@ def open_views(sides: Sequence[Side]) -> tuple[list[View | None], list[str]]:
         name = f"the view {view.view or 'default'} of {view.ocio}"
         try:
             opened[view] = _shown(view)
-            notes.append(f"view: {roles}: {name}, as in the video of the run")
         except SettingsError as error:
-            notes.append(
-                f"view: {roles}: the sRGB curve, clipped at white, since {name} can't be opened: {error}"
-            )
+            return [None] * len(sides), [
+                f"view: all sides: the sRGB curve, clipped at white, since {name} can't be opened: {error}"
+            ]
+        notes.append(f"view: {roles}: {name}, as in the video of the run")
     return [opened.get(of.get(side.role)) for side in sides], notes
 
 

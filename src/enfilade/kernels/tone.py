@@ -1,9 +1,9 @@
 """Linear radiance to display luminance: sRGB transfer (IEC 61966-2-1) and the display.
 
 The metric compares images as the viewer sees them: after the view transform of the video (exposure, sRGB
-encoding, clipping at white) and the display, which undoes the encoding. Methods assume this transform also
-for videos with a view of an OpenColorIO configuration, which may compress highlights and shadows
-differently; comparisons apply that view (:mod:`enfilade.comparison.views`).
+encoding, clipping at white) and the display, which undoes the encoding. The method `paper` assumes this
+transform also for videos with a view of an OpenColorIO configuration, which may compress highlights and
+shadows differently; comparisons apply that view (:mod:`enfilade.comparison.views`).
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ class Reference(Method):
     """Path tracing."""
 
     name = "reference"
-    revision = 4
+    revision = 5
     settings = (TraceSettings, SamplingSettings, ReferenceSettings)
     passes = (Pass(FRAMES, Frame),)
 

@@ -96,7 +96,8 @@ class ChannelSensitivity:
     """Weights of all channels for one pair of images: sensitivity times contrast of a unit response.
 
     Speeds are averaged over the area of a coarse sample as magnitudes, after the projection on the
-    channel's direction, so that motions to the left and to the right do not cancel.
+    channel's direction, so that motions to the left and to the right do not cancel; but for
+    :meth:`towards`.
 
     Parameters
     ----------
@@ -153,7 +154,8 @@ class ChannelSensitivity:
     def towards(self, band: Band, velocity: F32, thetas_deg: Iterable[F32], reduction: int) -> Iterator[F32]:
         """Sensitivity to patterns of each of several maps of directions, (h, w) degrees, at a reduced size.
 
-        They move at `velocity`, (2, h, w) deg/s. Of the samples the last row or column may be missing.
+        They move at `velocity`, (2, h, w) deg/s: one sample for each of the reduced size, not a mean. Of the
+        samples the last row or column may be missing.
         """
         row, rho = self._table.row(band), self._table.frequency_cpd(band)
         rows, columns = velocity.shape[1:]

@@ -23,13 +23,13 @@ from enfilade.settings import LimitSettings
 
 PARSER_VARIANT = "scalar_rgb"  # required by the parser, which is the same for all variants
 PLUGINS = Path(mi.__file__).resolve().parent / "plugins"
-INSTEAD = {  # of plugins that need a spectral variant of Mitsuba, or end the process: what to write
+REPLACEMENTS = {  # of plugins that need a spectral variant of Mitsuba, or end the process: what to write
     "blackbody": "<rgb> with the colour of that temperature",
     "timed_sunsky": '<emitter type="sunsky">',
 }
 BLENDER = "blender"  # its meshes are addresses in the memory of a process
 SOURCE_LOCATION = re.compile(r"\[\w+\.(?:cpp|h):\d+\] ")
-PYTHON_FUNCTION = re.compile(r"^\w+\(\): ")  # before messages of ours that go through Mitsuba's log
+OWN = "enfilade: "  # begins messages of ours that go through Mitsuba's log, which adds a function's name
 NUMBERS = ("Float", "Vector", "Color", "Transform")  # types of properties
 NOT_FINITE = re.compile(r"\b(?:nan|inf)\b")
 UNDEFINED = re.compile(r"undefined parameter: \$(\w+)")
@@ -54,10 +54,10 @@ def check_scene(scene: Path, limits: LimitSettings) -> None:
             if name != "scene" and not _is_own_plugin(name, resolver):
                 where = mi.parser.file_location(state, node)
                 raise SceneError(f"{where}: {name!r} is not one of Mitsuba's plugins for scene files")
-            if name in INSTEAD:
+            if name in REPLACEMENTS:
                 where = mi.parser.file_location(state, node)
                 raise SceneError(
-                    f"{where}: {name} can't be rendered here; write {INSTEAD[name]} in its place"
+                    f"{where}: {name} can't be rendered here; write {REPLACEMENTS[name]} in its place"
                 )
             _check_numbers(state, node)
             if name == "instance":
@@ -114,11 +114,11 @@ def collected_warnings() -> Iterator[list[str]]:
         def format(self, level: Any, cname: str | None, fname: str, line: int, msg: str) -> str:
             del level, fname, line
             text = " ".join(msg.split())
-            own = PYTHON_FUNCTION.sub("", text)
-            if own != text:
+            _, is_own, own = text.partition(OWN)
+            if is_own:
                 return own
             plugin = re.split(r"Impl|\[", cname or "")[0]
-            return f"Mitsuba warns{'' if plugin in text else f' of a {plugin}'}: {text}"
+            return f"Mitsuba warns{'' if plugin in text else f' ({plugin})'}: {text}"
 
     class Collector(mi.Appender):
         def append(self, level: Any, text: str) -> None:

@@ -19,7 +19,9 @@ PATH_TRACERS = {  # Mitsuba's classes that trace paths from the camera to their 
 POLARIZING = ("CircularPolarizer", "LinearPolarizer", "LinearRetarder", "MeasuredPolarized")
 # Rays start this far from a surface: times one and the largest coordinate there, as Mitsuba moves them.
 RAY_OFFSET = 1500 * 2.0**-24
-LARGEST_OFFSET = 2e-4  # of the scene's diagonal
+# Of the scene's diagonal. A cube of one unit keeps its contact shadow 1000 units from the origin, and loses it
+# at 10,000.
+LARGEST_OFFSET = 2e-4
 NEAR_SHARE = 0.01  # of the scene's diagonal: what is nearer than that is hardly ever in sight
 
 
@@ -47,6 +49,8 @@ def scene_integrator(scene: Any, max_depth: int) -> Any:
         )
     # Where camera rays pass hidden emitters (`Shapes`), the integrator need not.
     hides = own.hide_emitters and has_media(scene)
+    if not max_depth and hides == own.hide_emitters:
+        return own
     depth, rr_depth = _depths(own)
     return _limited(own, max_depth or depth, rr_depth, hides_emitters=hides)
 
@@ -58,10 +62,10 @@ def hides_emitters(scene: Any) -> bool:
 
 
 def _innermost(integrator: Any) -> Any:
-    """The path tracer in an integrator that writes AOVs or moments of it; others themselves."""
+    """The only integrator in one that writes AOVs or moments of it; others themselves."""
     if integrator.class_name() not in ("AOVIntegrator", "MomentIntegrator"):
         return integrator
-    nested = [n for n in mi.traverse(integrator).hierarchy if n.class_name() in PATH_TRACERS]
+    _, *nested = (node for node in mi.traverse(integrator).hierarchy if isinstance(node, mi.Integrator))
     return nested[0] if len(nested) == 1 else integrator
 
 
@@ -96,8 +100,8 @@ def why_inseparable(scene: Any, integrator: Any) -> str:
     return ""
 
 
-def ignored(scene: Any, integrator: Any) -> list[str]:
-    """What a scene has and frames will not show right.
+def limitations(scene: Any, integrator: Any) -> list[str]:
+    """Notes on parts of a scene that frames do not show, or not as Mitsuba would.
 
     Lenses and clipping of its sensors, media, some emitters, polarization, contacts far from the origin.
     """
@@ -132,13 +136,14 @@ def ignored(scene: Any, integrator: Any) -> list[str]:
         )
     if {node.class_name() for node in mi.traverse(scene).hierarchy}.intersection(POLARIZING):
         notes.append("light has no polarization here: polarizers and retarders do not show their effect")
-    if has_media(scene):
-        notes.append(
-            "the camera is taken to be in the medium of the scene's first sensor in all frames"
-            if is_volumetric(integrator)
-            else "the scene has participating media, which its integrator ignores: "
-            '<integrator type="volpath"/> and --method reference show them'
-        )
+    if not is_volumetric(integrator):
+        if has_media(scene):
+            notes.append(
+                "the scene has participating media, which its integrator ignores: "
+                '<integrator type="volpath"/> and --method reference show them'
+            )
+    elif scene.sensors() and scene.sensors()[0].get_medium() is not None:
+        notes.append("the camera is taken to be in the medium of the scene's first sensor in all frames")
     return notes
 
 

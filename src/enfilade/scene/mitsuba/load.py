@@ -15,10 +15,11 @@ from enfilade.device import active
 from enfilade.errors import SceneError
 from enfilade.resource_limits import is_out_of_memory
 from enfilade.scene.mitsuba.bsdfs import classes
-from enfilade.scene.mitsuba.files import files_beside, fingerprint, reason
+from enfilade.scene.mitsuba.files import OWN, files_beside, fingerprint, reason
 from enfilade.scene.mitsuba.shapes import has_meaning
 
 SCALE_TOLERANCE = 1e-4  # of the columns of a transform that does not scale
+FLAT = 1e-6  # of the largest element: what is left of a column that depends on the others
 # Emitters whose light Mitsuba 3.9.1 changes with the scale of their transform: directions get its length.
 SCALED_EMITTERS = ("directional", "envmap", "projector", "sunsky")
 SHEAR = 1e-4  # of UV maps below bump maps: V rises by a ten-thousandth of U
@@ -146,20 +147,27 @@ def _check_finite(file: Path, name: str, values: Any) -> None:
 
 
 def _unscale(state: Any, node: Any) -> None:
-    """Take the scale out of the transform of an emitter whose light it would change, and say so."""
+    """Take scale and shear out of the transform of an emitter whose light they would change, and say so.
+
+    The third column, along which lamps shine, keeps its direction.
+    """
     properties = node.props
     if properties.plugin_name() not in SCALED_EMITTERS or "to_world" not in properties:
         return
     transform = properties["to_world"]
     matrix = np.array(transform.matrix, np.float64).reshape(4, 4)
-    lengths = np.linalg.norm(matrix[:3, :3], axis=0)
-    if np.allclose(lengths, 1.0, rtol=0.0, atol=SCALE_TOLERANCE):
+    # Orthogonalize the columns, beginning with the third, by which the factor R has its signs.
+    reordered = matrix[:3, 2::-1]
+    q, r = np.linalg.qr(reordered)
+    signs = np.where(np.diag(r) < 0.0, -1.0, 1.0)
+    rotation = (q * signs)[:, ::-1]
+    if np.allclose(matrix[:3, :3], rotation, rtol=0.0, atol=SCALE_TOLERANCE):
         return
     emitter = f"the {properties.plugin_name()} emitter {properties.id()}".rstrip()
     where = mi.parser.file_location(state, node)
-    if not lengths.all():
+    if np.abs(np.diag(r)).min() <= FLAT * np.abs(matrix[:3, :3]).max():
         raise SceneError(f"{where}: the to_world of {emitter} scales by zero")
-    matrix[:3, :3] /= lengths
+    matrix[:3, :3] = rotation
     properties["to_world"] = type(transform)(matrix)
     _warn(
         f"{where}: the to_world of {emitter} has a scale, which would change its light: it is taken without "
@@ -169,7 +177,7 @@ def _unscale(state: Any, node: Any) -> None:
 
 def _warn(text: str) -> None:
     untyped: Any = mi  # its stubs lack the logger
-    untyped.Log(mi.LogLevel.Warn, text)
+    untyped.Log(mi.LogLevel.Warn, f"{OWN}{text}")
 
 
 def _shear_bump_maps(scene: Any) -> None:

@@ -41,8 +41,8 @@ from enfilade.scene.mitsuba.emitters import find_emitters, partly_sampled, trace
 from enfilade.scene.mitsuba.files import collected_warnings
 from enfilade.scene.mitsuba.integrators import (
     hides_emitters,
-    ignored,
     is_volumetric,
+    limitations,
     max_path_depth,
     scene_integrator,
     shortened,
@@ -100,7 +100,7 @@ class MitsubaRenderer:
             renderer=f"Mitsuba {mi.__version__}",
             shapes=self._shapes.names,
             has_background=scene.environment() is not None and not self._shapes.hides_emitters,
-            notes=(*ignored(scene, self._integrator), *partly_sampled(self._merged), *warnings),
+            notes=(*limitations(scene, self._integrator), *partly_sampled(self._merged), *warnings),
         )
         self._surfaces = recorded(
             lambda rays: self._intersect(rays)[0], lambda: (scene, self._shapes.state, self._lobes.state)
@@ -205,7 +205,9 @@ class MitsubaRenderer:
         return ShadingPoint(
             surfaces=surfaces,
             position=Array3f(si.p),
-            emission=self._transport.emission(si, bounce, active & self._is_seen(si, bounce is None)),
+            emission=self._transport.emission(
+                si, bounce, active & self._is_seen(si, is_camera_ray=bounce is None)
+            ),
             has_specular=self._lobes.has_specular(si, bsdf),
             may_pass=has_lobe(bsdf.flags(), "Null"),
             is_coated=self._lobes.is_coated(si, bsdf),
@@ -322,12 +324,12 @@ class MitsubaRenderer:
         active = Bool(True)
         if self._shapes.has_hidden:
             si, _, ray = self._intersect_beyond(ray, active, NULL_PATH)
-            active = self._is_seen(si, True)
+            active = self._is_seen(si, is_camera_ray=True)
         return dr.select(active, self._sampled(self._integrator, ray, sampler)[0], 0.0)
 
-    def _is_seen(self, si: Any, from_camera: bool) -> Any:
-        """Whether what a ray meets may be seen: the background is not where emitters are hidden; Bool."""
-        return si.is_valid() if from_camera and self._shapes.hides_emitters else Bool(True)
+    def _is_seen(self, si: Any, *, is_camera_ray: bool) -> Any:
+        """Whether a ray sees emission: where emitters are hidden, the camera sees no background; Bool."""
+        return si.is_valid() if is_camera_ray and self._shapes.hides_emitters else Bool(True)
 
     def _continued_radiance(
         self, rays: Rays, sampler: Any, depths: tuple[int, int], active: Any
