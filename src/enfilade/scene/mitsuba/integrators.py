@@ -19,7 +19,7 @@ PATH_TRACERS = {  # Mitsuba's classes that trace paths from the camera to their 
 POLARIZING = ("CircularPolarizer", "LinearPolarizer", "LinearRetarder", "MeasuredPolarized")
 # Rays start this far from a surface: times one and the largest coordinate there, as Mitsuba moves them.
 RAY_OFFSET = 1500 * 2.0**-24
-# Of the scene's diagonal. A cube of one unit has its contact shadow 1000 units from the origin, not at 10,000.
+# Of the scene's diagonal. A unit cube has its contact shadow 1000 units from the origin, not at 10,000.
 LARGEST_OFFSET = 2e-4
 NEAR_SHARE = 0.01  # of the scene's diagonal: what is nearer than that is hardly ever in sight
 
