@@ -105,7 +105,7 @@ def limitations(scene: Any, integrator: Any) -> list[str]:
     Lenses and clipping of its sensors, media, some emitters, polarization, contacts far from the origin.
     """
     box = scene.bbox()
-    diagonal, farthest = (float(np.linalg.norm(box.extents())), float(np.abs([box.min, box.max]).max()))
+    diagonal, farthest = float(np.linalg.norm(box.extents())), float(np.abs([box.min, box.max]).max())
     notes = [
         f"the scene's sensor is a {sensor.class_name()}: every frame is the perspective image of a pinhole"
         for sensor in scene.sensors()
