@@ -4,6 +4,7 @@ import ctypes
 import os
 import subprocess
 import sys
+from importlib import import_module
 from types import SimpleNamespace
 
 import drjit as dr
@@ -34,9 +35,12 @@ def test_what_needs_no_device_loads_no_dr_jit(module):
 
 
 def pretend(monkeypatch, *, llvm, cuda=False, optix=True, version=(19, 1, 7)):
+    own = ctypes.CDLL
+
     def library(name):
-        if not optix:
+        if not optix and "drjit" not in name:
             raise OSError(f"{name}: cannot open shared object file")
+        return own(name) if "drjit" in name else None
 
     monkeypatch.setattr(ctypes, "CDLL", library)
     has = {dr.JitBackend.LLVM: llvm, dr.JitBackend.CUDA: cuda}
@@ -95,6 +99,7 @@ def test_a_gpu_that_can_not_trace_rays_is_not_taken(monkeypatch):
 
 
 def test_a_process_has_one_device(monkeypatch, tmp_path):
+    import_module("enfilade.reports.page")  # with the arrays of this process
     chosen = pretend(monkeypatch, llvm=True, cuda=True)
     monkeypatch.setattr("enfilade.device.active", lambda: "that of the arrays")
     for kind, own, other in ((dr.llvm, "cpu", "GPU"), (dr.cuda, "gpu", "CPU")):
@@ -105,6 +110,28 @@ def test_a_process_has_one_device(monkeypatch, tmp_path):
         with pytest.raises(RunFolderError):  # a report takes the device that there is
             enfilade.report(tmp_path)
     assert chosen == []
+
+
+def test_gathers_of_avx2_are_compiled_to_instructions():
+    code = """
+import ctypes, sys
+from enfilade import device
+device.activate("cpu")
+device.active()  # a second time
+import drjit
+core = ctypes.CDLL(f"{drjit.__path__[0]}/libdrjit-core.so")
+features = core[device.CPU_FEATURES]
+features.restype = ctypes.c_char_p
+print(features().decode(), core[device.VECTOR_WIDTH]())
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)  # noqa: S603
+    features, width = done.stdout.split()
+    if "+avx512f" in features:
+        assert int(width) == 16
+    elif "+avx2" in features:
+        assert (features.count("+fast-gather"), int(width)) == (1, 8)
+    else:
+        assert "fast-gather" not in features.replace("-fast-gather", "")
 
 
 @pytest.mark.parametrize("before", [None, "1,3"])

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Literal
 
 from enfilade.errors import DeviceError
@@ -18,6 +19,13 @@ from enfilade.errors import DeviceError
 LLVM_MINIMUM = 17  # older ones abort inside the compiler: they lack "fmaximum", or fail on some kernels
 INSTALL_LLVM = "install it with: sudo apt-get install libllvm19 (any LLVM from 17 on will do)"
 INSTALL_LIBRARIES = "the library that it misses is most likely had by: sudo apt-get install libatomic1"
+
+# Dr.Jit's C++ interface to the processor that LLVM compiles for; the Python interface has none.
+CPU_NAME = "_Z19jit_llvm_target_cpuv"
+CPU_FEATURES = "_Z24jit_llvm_target_featuresv"
+VECTOR_WIDTH = "_Z21jit_llvm_vector_widthv"
+SET_TARGET = "_Z19jit_llvm_set_targetPKcS0_j"
+FAST_GATHER = b"+fast-gather"
 
 NO_GPU = "no usable NVIDIA GPU on this machine"
 NO_OPTIX = (
@@ -169,4 +177,29 @@ def _llvm() -> Device:
     if version[0] < LLVM_MINIMUM:
         found = ".".join(map(str, version))
         raise DeviceError(f"LLVM {found} is too old, {LLVM_MINIMUM} is needed; {INSTALL_LLVM}")
+    _use_gather_instructions(Path(dr.__file__).with_name("libdrjit-core.so"))
     return Device("llvm", "llvm_ad_rgb")
+
+
+def _use_gather_instructions(library: Path) -> None:
+    """Have LLVM compile gathers to gather instructions wherever the processor has these.
+
+    LLVM takes those of AMD processors without AVX-512 for slow, and branches for each lane instead: kernels
+    took 2.6 times as long to compile (49 s in place of 19 s for a test with 155 of them), and a walkthrough
+    13 % more CPU time. Where Dr.Jit lacks the interface, that is the only loss.
+    """
+    core = ctypes.CDLL(str(library))
+    try:
+        name, features, width, set_target = (
+            core[CPU_NAME],
+            core[CPU_FEATURES],
+            core[VECTOR_WIDTH],
+            core[SET_TARGET],
+        )
+    except AttributeError:
+        return
+    name.restype = features.restype = ctypes.c_char_p
+    set_target.argtypes, set_target.restype = [ctypes.c_char_p, ctypes.c_char_p, ctypes.c_uint32], None
+    enabled: bytes = features() or b""
+    if b"+avx2" in enabled and b"+avx512f" not in enabled and FAST_GATHER not in enabled:
+        set_target(name(), enabled + b"," + FAST_GATHER, width())
