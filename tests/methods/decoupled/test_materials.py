@@ -30,14 +30,8 @@ from support.material_scene import (
     traced_irradiance,
 )
 
-# Alone in this file: while this scene is open, its materials are compiled into the kernels of all scenes.
-
-
-@pytest.fixture(scope="module")
-def materials(tmp_path_factory):
-    """Balls of all materials, and the path traced irradiance of an image."""
-    renderer = opened_scene(tmp_path_factory.mktemp("materials"), MATERIALS)
-    return renderer, traced_irradiance(renderer, front_camera())[1]
+# Alone in this file: while a scene is open, its materials are compiled into the kernels of all scenes. Tests
+# that open their own scene come first, before the scene of the others.
 
 
 def large_errors(renderer, camera, ours, reference):
@@ -50,13 +44,6 @@ def large_errors(renderer, camera, ours, reference):
     }
     assert set(MATERIALS) < set(errors)
     return {name: error for name, error in errors.items() if abs(error) > 4.0}
-
-
-def test_without_a_cache_every_material_keeps_its_energy(materials):
-    renderer, camera = materials[0], front_camera()
-    ours, reference = shaded(renderer, EMPTY, camera, 256), traced(renderer, camera, 256)
-    # Of 18 shapes one exceeds four standard errors once in 1000 runs.
-    assert large_errors(renderer, camera, ours, reference) == {}
 
 
 def test_highlights_of_sharp_emitters_are_counted_once(tmp_path):
@@ -171,6 +158,20 @@ def test_below_maps_energy_is_kept_and_the_albedo_is_that_of_the_nested_bsdf(tmp
         assert np.ptp(geometry.albedo[here], axis=0).max() < 1e-5
         assert geometry.albedo[here][0] == pytest.approx(np.array([0.6, 0.4, 0.2]) * part.get(name, 1.0))
         assert abs(standard_errors(ours, reference, here.ravel())) < 4.0
+
+
+@pytest.fixture(scope="module")
+def materials(tmp_path_factory):
+    """Balls of all materials, and the path traced irradiance of an image."""
+    renderer = opened_scene(tmp_path_factory.mktemp("materials"), MATERIALS)
+    return renderer, traced_irradiance(renderer, front_camera())[1]
+
+
+def test_without_a_cache_every_material_keeps_its_energy(materials):
+    renderer, camera = materials[0], front_camera()
+    ours, reference = shaded(renderer, EMPTY, camera, 256), traced(renderer, camera, 256)
+    # Of 18 shapes one exceeds four standard errors once in 1000 runs.
+    assert large_errors(renderer, camera, ours, reference) == {}
 
 
 def test_final_gathering_converges_to_path_traced_irradiance(materials):
