@@ -7,7 +7,7 @@ from typing import Any
 
 import drjit as dr
 
-from enfilade.arrays import Array3f, Bool, UInt
+from enfilade.arrays import Array3f, Bool, UInt, opaque
 from enfilade.kernels.guiding import PathGuide
 from enfilade.kernels.replay import recorded
 from enfilade.methods.decoupled.cache_query import CacheQuery, query_further, query_hash_grid, query_view
@@ -101,7 +101,13 @@ class PathKernels:
     """
 
     def __init__(self, renderer: LobeRenderer) -> None:
-        self._renderer, state = renderer, renderer.state
+        self._renderer = renderer
+        # As data: scenes that differ in it alone share their kernels.
+        self._max_depth = max_depth = opaque(renderer.max_path_depth())
+
+        def state() -> Any:
+            return renderer.state(), max_depth
+
         self.probe = recorded(lambda guide, path: trace_probes(renderer, guide, path), state)
         self.see = recorded(self._see, state)
         self.see_tint = recorded(self._see_tint, state)
@@ -179,7 +185,7 @@ class PathKernels:
 
         # End it at the scene's limit; Mitsuba's `volpath` does not count null interactions.
         depth = path.depth + dr.select(sample.is_passed, UInt(0), UInt(1))
-        is_alive = sample.is_alive & (depth < self._renderer.max_path_depth())
+        is_alive = sample.is_alive & (depth < self._max_depth)
 
         # Extend the path; a broad lobe widens it.
         is_narrow = sample.bounce.is_delta | sample.is_passed
@@ -296,7 +302,7 @@ class PathKernels:
 
     def _lit(self, path: Path) -> Any:
         """1 where the next surface may reflect light within the scene's limit of path depth, else 0."""
-        return dr.select(path.depth + 1 < self._renderer.max_path_depth(), 1.0, 0.0)
+        return dr.select(path.depth + 1 < self._max_depth, 1.0, 0.0)
 
     def _terminate(self, path: Path) -> Any:
         """Path trace the specular lobes at the next surface to their end."""
