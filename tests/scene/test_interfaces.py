@@ -4,10 +4,10 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from enfilade.arrays import Array3f, Bool, UInt, rows
+from enfilade.arrays import Array3f, Bool, UInt, rows, vector3
 from enfilade.kernels.random import one_sequence
 from enfilade.renderer import Branch, Rays
-from support.mitsuba_scene import HOLES, opened, rgb, write, write_holes
+from support.mitsuba_scene import HOLES, opened, placed, rgb, write, write_holes
 
 COUNT = 1 << 17
 GLASS = '<float name="spec_trans" value="1"/><float name="roughness" value="0.4"/>'
@@ -18,7 +18,7 @@ INTERFACES = {
 }
 # Glass under a bump map, whose slopes reflect no light totally at the angles below.
 BUMPY = (
-    f'<bsdf type="bumpmap">{HOLES.format("bump", "bilinear")}<float name="scale" value="0.02"/>'
+    f'<bsdf type="bumpmap">{HOLES.format("bump", "bilinear")}<float name="scale" value="0.002"/>'
     '<bsdf type="{}"/></bsdf>'
 )
 CLEAR = {
@@ -33,23 +33,38 @@ OTHERS = {
 }
 
 
-def plane(folder, bsdf):
-    """A plane, under a lamp that shadow rays find."""
+PATCHES = INTERFACES | CLEAR | OTHERS
+SIZE = 0.1
+
+
+@pytest.fixture(scope="module")
+def renderer(tmp_path_factory):
+    """Patches of a plane in a row, one a material, under a lamp that shadow rays find."""
+    folder = tmp_path_factory.mktemp("patches")
+    write_holes(folder)
     emitter = f'<emitter type="area">{rgb("radiance", 3, 3, 3)}</emitter>'
     lamp = (
         '<shape type="rectangle"><transform name="to_world"><rotate x="1" angle="180"/>'
         f'<translate x="0.8" z="2"/></transform>{emitter}</shape>'
     )
-    return opened(write(folder, f'<shape type="rectangle">{bsdf}</shape>{lamp}'))
+    patches = (placed("rectangle", name, centre(name), bsdf, SIZE) for name, bsdf in PATCHES.items())
+    return opened(write(folder, *patches, lamp))
 
 
-def scattered(renderer, angle, from_above=True, branch=None):
-    """Samples at the plane, for a viewer at an angle, degrees, from its normal."""
+def centre(name):
+    row = list(PATCHES).index(name) - len(PATCHES) // 2
+    return 0.0, 2.2 * SIZE * row, 0.0
+
+
+def scattered(renderer, name, angle, from_above=True, branch=None):
+    """Samples at the patch of a material, for a viewer at an angle, degrees, from its normal."""
     tilt = np.radians(angle)
     away = np.array([np.sin(tilt), 0.0, np.cos(tilt) if from_above else -np.cos(tilt)])
-    rays = Rays(*(Array3f(*map(float, of)) + dr.zeros(Array3f, COUNT) for of in (away, -away)))
+    rays = Rays(*(vector3(of) + dr.zeros(Array3f, COUNT) for of in (centre(name) + away, -away)))
     point, lanes = renderer.intersect(rays), dr.opaque(UInt, branch or 0, COUNT)
-    return renderer.sample_specular(point, one_sequence(COUNT), branch=None if branch is None else lanes)
+    sample = renderer.sample_specular(point, one_sequence(COUNT), branch=None if branch is None else lanes)
+    dr.eval(sample)  # by one kernel
+    return sample
 
 
 def moments(sample):
@@ -61,11 +76,10 @@ def moments(sample):
 
 @pytest.mark.parametrize("from_above", [True, False])
 @pytest.mark.parametrize("name", INTERFACES)
-def test_branches_add_up_to_the_whole(tmp_path, name, from_above):
-    renderer = plane(tmp_path, INTERFACES[name])
+def test_branches_add_up_to_the_whole(renderer, name, from_above):
     angle = 38.0  # from below, many facets reflect totally
-    whole = scattered(renderer, angle, from_above)
-    parts = [scattered(renderer, angle, from_above, int(branch)) for branch in Branch]
+    whole = scattered(renderer, name, angle, from_above)
+    parts = [scattered(renderer, name, angle, from_above, int(branch)) for branch in Branch]
     assert dr.all(parts[0].is_split)
     assert not dr.any(whole.is_split)
     assert sum(map(moments, parts)) == pytest.approx(moments(whole), abs=0.004)
@@ -79,12 +93,10 @@ def test_branches_add_up_to_the_whole(tmp_path, name, from_above):
 
 @pytest.mark.parametrize("from_above", [True, False])
 @pytest.mark.parametrize("name", CLEAR)
-def test_both_branches_of_clear_interfaces_are_followed(tmp_path, name, from_above):
+def test_both_branches_of_clear_interfaces_are_followed(renderer, name, from_above):
     """Also below a bump map: without chance, the reflection has Fresnel's share in every sample."""
-    write_holes(tmp_path)
-    renderer = plane(tmp_path, CLEAR[name])
-    whole = scattered(renderer, 30.0, from_above)
-    parts = [scattered(renderer, 30.0, from_above, int(branch)) for branch in Branch]
+    whole = scattered(renderer, name, 30.0, from_above)
+    parts = [scattered(renderer, name, 30.0, from_above, int(branch)) for branch in Branch]
     assert all(dr.all(part.is_split & part.is_alive) for part in parts)
     assert sum(map(moments, parts)) == pytest.approx(moments(whole), abs=0.01)
     weights = [rows(part.throughput)[:, 0] for part in parts]
@@ -98,10 +110,9 @@ def test_both_branches_of_clear_interfaces_are_followed(tmp_path, name, from_abo
     ]
 
 
-def test_a_reflection_is_as_strong_as_its_share(tmp_path):
+def test_a_reflection_is_as_strong_as_its_share(renderer):
     """Of glass, 4 % along the normal: in every sample, not in one of 25."""
-    renderer = plane(tmp_path, INTERFACES["principled"])
-    reflected = scattered(renderer, 0.0, branch=int(Branch.REFLECTED))
+    reflected = scattered(renderer, "principled", 0.0, branch=int(Branch.REFLECTED))
     weight = rows(reflected.throughput)[np.array(Bool(reflected.is_alive)), 0]
     assert len(weight) > 0.9 * COUNT
     assert weight.mean() == pytest.approx(0.04, rel=0.1)
@@ -109,8 +120,7 @@ def test_a_reflection_is_as_strong_as_its_share(tmp_path):
 
 
 @pytest.mark.parametrize("name", OTHERS)
-def test_other_materials_are_left_to_chance(tmp_path, name):
-    renderer = plane(tmp_path, OTHERS[name])
-    one, other = (scattered(renderer, 20.0, branch=int(branch)) for branch in Branch)
+def test_other_materials_are_left_to_chance(renderer, name):
+    one, other = (scattered(renderer, name, 20.0, branch=int(branch)) for branch in Branch)
     assert not dr.any(one.is_split | other.is_split)
     assert moments(one) == pytest.approx(moments(other))
