@@ -5,13 +5,22 @@ import os
 import subprocess
 import sys
 from importlib import import_module
+from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import drjit as dr
 import pytest
 
 import enfilade
-from enfilade.device import activate
+from enfilade.device import (
+    CPU_FEATURES,
+    CPU_NAME,
+    SET_TARGET,
+    VECTOR_WIDTH,
+    _use_gather_instructions,
+    activate,
+)
 from enfilade.errors import DeviceError, RunFolderError
 from enfilade.installation import examine
 
@@ -112,6 +121,38 @@ def test_a_process_has_one_device(monkeypatch, tmp_path):
     assert chosen == []
 
 
+class Core(dict):
+    """Dr.Jit's C++ interface as ``ctypes`` shows it."""
+
+    def __getitem__(self, name):
+        if name not in self:
+            raise AttributeError(f"undefined symbol: {name}")
+        return super().__getitem__(name)
+
+
+@pytest.mark.parametrize(
+    ("features", "has_interface", "expected"),
+    [
+        (b"+avx,+avx2", True, b"+avx,+avx2,+fast-gather"),
+        (b"+avx2,+fast-gather", True, None),
+        (b"+avx2,+avx512f", True, None),
+        (b"+avx", True, None),
+        (b"+avx,+avx2", False, None),
+    ],
+)
+def test_the_target_changes_only_where_gathers_would_be_branches(
+    monkeypatch, features, has_interface, expected
+):
+    targets = []
+    values = {CPU_NAME: b"znver3", CPU_FEATURES: features, VECTOR_WIDTH: 8}
+    core = Core({name: Mock(return_value=value) for name, value in values.items()})
+    if has_interface:
+        core[SET_TARGET] = Mock(side_effect=lambda *target: targets.append(target))
+    monkeypatch.setattr(ctypes, "CDLL", lambda _: core)
+    _use_gather_instructions(Path("libdrjit-core.so"))
+    assert targets == ([(b"znver3", expected, 8)] if expected else [])
+
+
 def test_gathers_of_avx2_are_compiled_to_instructions():
     code = """
 import ctypes, sys
@@ -138,7 +179,14 @@ print(features().decode(), core[device.VECTOR_WIDTH]())
 def test_a_run_on_the_cpu_keeps_off_the_gpus_and_its_children_need_not(before):
     code = """
 import builtins, os
-from enfilade.device import activate
+from enfilade.device import (
+    CPU_FEATURES,
+    CPU_NAME,
+    SET_TARGET,
+    VECTOR_WIDTH,
+    _use_gather_instructions,
+    activate,
+)
 own = builtins.__import__
 def spy(name, *rest, **more):
     if name == "drjit":
