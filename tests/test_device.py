@@ -155,7 +155,7 @@ def test_the_target_changes_only_where_gathers_would_be_branches(
 
 def test_gathers_of_avx2_are_compiled_to_instructions():
     code = """
-import ctypes, sys
+import ctypes
 from enfilade import device
 device.activate("cpu")
 device.active()  # a second time
@@ -179,14 +179,7 @@ print(features().decode(), core[device.VECTOR_WIDTH]())
 def test_a_run_on_the_cpu_keeps_off_the_gpus_and_its_children_need_not(before):
     code = """
 import builtins, os
-from enfilade.device import (
-    CPU_FEATURES,
-    CPU_NAME,
-    SET_TARGET,
-    VECTOR_WIDTH,
-    _use_gather_instructions,
-    activate,
-)
+from enfilade.device import activate
 own = builtins.__import__
 def spy(name, *rest, **more):
     if name == "drjit":
