@@ -12,6 +12,7 @@ import numpy.typing as npt
 F32 = npt.NDArray[np.float32]
 I32 = npt.NDArray[np.int32]
 FLAT = 1e-4  # extent of a mesh across its plane, relative to that along it
+NEAR = 1e-4  # distance of vertices that meet, relative to the extent
 UNIT = 1e-2  # deviation of a normal's length from 1
 
 
@@ -125,12 +126,33 @@ class Mesh:
 
     def is_closed(self) -> bool:
         """Whether every edge has two triangles, by positions."""
-        _, merged = np.unique(self.positions, axis=0, return_inverse=True)
-        corners = merged.reshape(-1)[self.triangles].astype(np.int64)
+        return bool((self.edges()[1] == 2).all())
+
+    def openness(self) -> float:
+        """Share that the holes have of the area of the mesh and them: of a plane 1/2, of a closed mesh 0.
+
+        A hole is what lies between connected edges of one triangle each, after vertices that nearly meet are
+        merged. Its area is that of its projection along its mean normal.
+        """
+        if not len(self):
+            return 0.0
+        step = NEAR * max(float(np.ptp(self.positions, axis=0).max()), 1e-30)
+        near = replace(self, positions=np.round(self.positions / step).astype(np.float32))
+        missing = float(np.linalg.norm(_holes(near), axis=-1).sum())
+        return missing / max(missing + near.area(), 1e-30)
+
+    def merged(self) -> tuple[F32, npt.NDArray[np.int64]]:
+        """Distinct positions (V, 3), and those of the vertices."""
+        places, merged = np.unique(self.positions, axis=0, return_inverse=True)
+        return places, merged.reshape(-1).astype(np.int64)
+
+    def edges(self) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+        """Edges (E, 2) along triangles, as distinct positions, and of each how many triangles share it."""
+        corners = self.merged()[1][self.triangles]
         edges = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
-        edges.sort(axis=1)
-        _, counts = np.unique(edges[:, 0] * (len(self.positions) + 1) + edges[:, 1], return_counts=True)
-        return bool((counts == 2).all())
+        keys = edges.min(axis=1) * (len(self.positions) + 1) + edges.max(axis=1)
+        _, which, counts = np.unique(keys, return_inverse=True, return_counts=True)
+        return edges, counts[which.reshape(-1)]
 
     def is_flat(self) -> bool:
         """Whether all vertices lie in a plane."""
@@ -142,6 +164,23 @@ class Mesh:
         """Volume inside a closed mesh; negative where its triangles face inward."""
         a, b, c = (self.positions[self.triangles[:, corner]].astype(np.float64) for corner in range(3))
         return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
+
+
+def _holes(mesh: Mesh) -> npt.NDArray[np.float64]:
+    """Areas times normals of holes, (V, 3), at one vertex of each."""
+    edges, counts = mesh.edges()
+    starts, ends = edges[counts == 1].T
+    hole = np.arange(edges.max() + 1)  # of a vertex: the least that it is known to be connected to
+    while not np.array_equal(hole[starts], hole[ends]):
+        least = np.minimum(hole[starts], hole[ends])
+        for vertices in (hole[starts], hole[ends], starts, ends):
+            np.minimum.at(hole, vertices, least)
+        hole = hole[hole]
+    places = mesh.merged()[0].astype(np.float64)
+    places -= places.mean(axis=0)
+    areas = np.zeros((len(hole), 3))
+    np.add.at(areas, hole[starts], 0.5 * np.cross(places[starts], places[ends]))
+    return areas
 
 
 def joined(meshes: list[Mesh]) -> Mesh:

@@ -189,6 +189,21 @@ def test_a_mix_with_transparent_by_the_kind_of_ray_is_its_other_side(blender):
     assert ray["effect"] == "all rays see it as those do in Blender for which that is 0"
 
 
+def test_glass_without_a_back_is_thin(blender):
+    code, out, result = blender.job(blender.make("sheets_of_glass")[0], "sheets of glass")
+    assert code == 0, result
+    root = ET.parse(out / "scene.xml").getroot()
+    bsdfs = {element.get("id"): element.get("type") for element in root.findall("bsdf")}
+    kinds = {shape.get("id"): bsdfs[shape.find("ref").get("id")] for shape in root.findall("shape")}
+    assert kinds == {
+        **{f"clear {x}": "thindielectric" for x in (-2, 0)},
+        **{f"frosted {x}": "principledthin" for x in (-2, 0)},
+        "Ball": "dielectric",
+    }
+    noted = [note["object"] for note in result["notes"] if "of an open mesh" in note["what"]]
+    assert sorted(noted) == ["clear", "frosted"]
+
+
 def test_clear_glass_that_shadow_rays_pass_is_thin_but_on_solid_objects(blender):
     code, out, result = blender.job(blender.make("kinds_of_panes")[0], "kinds of panes")
     assert code == 0, result

@@ -72,6 +72,15 @@ def test_a_thin_pane_passes_what_fresnels_factor_does_not_reflect(context, rough
     assert noted(context) == notes
 
 
+@pytest.mark.parametrize("roughness", [0.0, 0.4])
+@pytest.mark.parametrize("ior", [1.5, 1 / 1.5])
+def test_a_sheet_of_glass_keeps_the_energy_of_light_from_both_sides(context, roughness, ior):
+    glass = Lobe("glass", WHITE, "glass", Constant((roughness,)), Constant((ior,)))
+    assert albedo(glass, replace(context, is_sheet=True)) == pytest.approx(1.0, abs=0.05)
+    assert noted(context) == ["glass of an open mesh is a thin pane"]
+    assert abs(albedo(glass, context) - 1.0) > 0.3  # of an interface, whose other side undoes that
+
+
 GREY, ROUGH = Constant((0.5, 0.5, 0.5)), Constant((0.9,))
 METAL = {"Base Color": GREY, "Metallic": Constant((1.0,)), "Roughness": ROUGH}
 

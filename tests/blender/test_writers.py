@@ -98,6 +98,37 @@ def test_a_square_is_flat_and_open_and_a_tetrahedron_closed():
     assert not solid.is_flat()
 
 
+def cube(*, sides=6, gap=0.0):
+    """Some sides of a cube; the first is moved by a gap."""
+    axes = np.eye(3)[[0, 1, 2, 0, 1, 2]]
+    meshes = []
+    for side, (normal, sign) in enumerate(zip(axes, (1, 1, 1, -1, -1, -1), strict=True)):
+        right = np.roll(normal, 1)
+        corners = [sign * normal + u * right + sign * v * np.cross(normal, right) for u, v in QUAD]
+        points = np.array(corners) + gap * normal * (side == 0)
+        meshes.append(replace(square(), positions=points.astype(np.float32)))
+    return joined(meshes[:sides])
+
+
+APART = np.array([[3.0, 0, 0, 5], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+QUAD = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+
+
+@pytest.mark.parametrize(
+    ("mesh", "share"),
+    [
+        (square(), 1 / 2),
+        (joined([square(), square().transformed(APART).reversed()]), 1 / 2),
+        (cube(), 0.0),
+        (cube(sides=5), 1 / 6),
+        (cube(gap=5e-5), 0.0),
+    ],
+    ids=["a square", "two squares", "a cube", "an open cube", "a cube with a crack"],
+)
+def test_openness_is_the_share_of_holes(mesh, share):
+    assert mesh.openness() == pytest.approx(share, abs=1e-3)
+
+
 def test_joined_copies_keep_their_corners():
     both = joined([square(), square().transformed(np.diag([2.0, 2.0, 2.0, 1.0]))])
     assert len(both) == 4

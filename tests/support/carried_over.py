@@ -210,6 +210,11 @@ OBJECTS = (
         "lamps: the camera does not see them; they cast no shadows",
     ),
     ("Clear glass without a shadow", "approximated", "a thin pane, unless it is a thick object"),
+    (
+        "Glass of an open mesh, as a window of one plane",
+        "approximated",
+        "`thindielectric`, or `principledthin` if it is rough: nothing is bent",
+    ),
     ("Other meshes that the camera does not see", "mapped", "BSDFs whose id says so; mirrors show them"),
     (
         "Other ray visibility of meshes, shadow catcher, holdout, indirect only",

@@ -46,6 +46,7 @@ TRANSMITTING = {
 DIFFUSE = {"diffuse", "plastic", "roughplastic", "blendbsdf"}  # plastics are so for the most part
 DELTA = {"conductor", "dielectric", "thindielectric", "null"}  # without rough lobes
 ROUGHENED = {"conductor", "dielectric", "plastic"}  # smooth ones that have a rough counterpart
+SHEET_ROUGHNESS = 0.7  # of a thin pane that spreads what passes it as one interface does
 ALMOST = 0.995  # weights above are 1, below the rest 0
 
 
@@ -59,6 +60,7 @@ class Context:
     is_mirrored: bool = False  # the UV map, below normal maps
     is_back: bool = False  # the side of a surface that normals point away from
     is_solid: bool = False  # the object is closed, and no pane
+    is_sheet: bool = False  # glass without a back
     uv_density: float = 1.0  # texture coordinates for each scene unit
 
 
@@ -171,6 +173,8 @@ def glass_bsdf(
     Without `is_multiple` Blender loses it, too.
     """
     ior = ior if abs(ior - 1.0) > 1e-3 else 1.001
+    if context.is_sheet:
+        return _sheet_of_glass(transmitted, reflected, roughness, ior, context)
     alpha = _alpha(roughness, context)
     tints: dict[str, Property] = {}
     values = {"specular_transmittance": transmitted, "specular_reflectance": reflected}
@@ -185,6 +189,25 @@ def glass_bsdf(
         if tint != WHITE:
             tints[name] = tint
     return _microfacets("dielectric", alpha, int_ior=ior, ext_ior=1.0, **tints)
+
+
+def _sheet_of_glass(
+    transmitted: Value | Element, reflected: Value, roughness: Value, ior: float, context: Context
+) -> Element:
+    """Glass with one interface, as thin glass: Mitsuba's interfaces change radiance by the squared index."""
+    what, effect = "glass of an open mesh is a thin pane", "nothing is bent behind it, and light passes"
+    context.notes.add("approximated", context.owner, "Glass", what, effect)
+    through, back = (
+        value if isinstance(value, Element) else context.textures.colour(value)
+        for value in (transmitted, reflected)
+    )
+    if isinstance(roughness, Constant) and clipped(roughness.number) ** 2 < SMOOTH:
+        tints = {"specular_transmittance": through, "specular_reflectance": back}
+        return plugin("bsdf", "thindielectric", int_ior=mapping.thin_ior(ior), ext_ior=1.0, **tints)
+    rough = context.textures.scaled_number(roughness, SHEET_ROUGHNESS)
+    return plugin(
+        "bsdf", "principledthin", base_color=through, roughness=rough, spec_trans=1.0, eta=max(ior, 1.0 / ior)
+    )
 
 
 def _glass_gain(ior: float, number: int, alpha: float, *, is_multiple: bool) -> float:

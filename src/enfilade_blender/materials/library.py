@@ -25,6 +25,7 @@ from enfilade_blender.materials.values import (
     Shader,
     Texture,
     has_panes,
+    is_glassy,
     normals_of,
     values_of,
 )
@@ -34,6 +35,7 @@ from enfilade_blender.records import Placed, Selection, View
 from enfilade_blender.scene_xml import HIDDEN, Element, Identifiers, named
 
 DEFAULT = Lobe("diffuse", Constant((0.8, 0.8, 0.8)), "no material")
+SHEET_OPENNESS = 0.15  # of glass without a back: a box without its bottom has 0.17, a tumbler 0.12
 MAX_PANE_RATIO = 0.05  # of the mean thickness of a pane to the root of its area
 
 
@@ -163,15 +165,17 @@ class MaterialLibrary:
         owner = of.part if of.is_own else None
         density = _uv_density(of)
         is_solid = has_panes(of.shader) and _is_solid(of.part)
+        is_sheet = is_glassy(of.shader) and of.part.mesh.openness() > SHEET_OPENNESS
         name = material.name_full if material else ""
         has_shadow = of.part.placed.has_shadow
-        key = name, is_mirrored, of.is_back_seen, of.is_hidden, owner, density, is_solid, has_shadow
+        shape = is_mirrored, density, is_solid, is_sheet
+        key = name, of.is_back_seen, of.is_hidden, owner, has_shadow, shape
         if key in self._surfaces:
             return self._surfaces[key]
         context = Context(
             material.name if material else "no material", self.textures, self._notes, is_mirrored
         )
-        context = replace(context, uv_density=density, is_solid=is_solid)
+        context = replace(context, uv_density=density, is_solid=is_solid, is_sheet=is_sheet)
         surface = build(of.shader, context)
         back = build(of.shader, replace(context, is_back=True)) if of.is_back_seen else None
         element = surface.element(context, back)

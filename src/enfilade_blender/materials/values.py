@@ -278,6 +278,16 @@ def has_panes(shader: Shader) -> bool:
     return False
 
 
+def is_glassy(shader: Shader) -> bool:
+    """Whether a part of a shader is glass."""
+    if isinstance(shader, Mix | Add):
+        return is_glassy(shader.first) or is_glassy(shader.second)
+    if isinstance(shader, Principled):
+        weight = shader["Transmission Weight"]
+        return not isinstance(weight, Constant) or weight.number > 0.0
+    return isinstance(shader, Lobe) and shader.kind in ("glass", "refraction")
+
+
 def values_of(shader: Any) -> Iterator[Value | ProceduralNormal]:
     """All values below a shader, those of normals included."""
     if isinstance(shader, Value | ProceduralNormal):

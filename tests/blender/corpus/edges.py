@@ -38,7 +38,6 @@ def uncommon_materials(folder):
     materials = [make(half) for make in kinds]
     materials += [
         principled("premultiplied", half, Metallic=1.0),
-        principled("stained glass", half, Transmission_Weight=1.0, Roughness=0.0),
         principled("brushed", Metallic=1.0, Anisotropic=0.8, Anisotropic_Rotation=0.25),
         principled("brushed by image", Metallic=1.0, Anisotropic=half),
         principled("green mirror", Metallic=1.0, Roughness=image("green", _green, 16, space="Non-Color")),
@@ -49,6 +48,8 @@ def uncommon_materials(folder):
     ]
     for number, material in enumerate(materials):
         plane(material.name, (2.0 * number, 0.0, 0.0), 1.5, material)
+    stained = principled("stained glass", half, Transmission_Weight=1.0, Roughness=0.0)
+    cube("stained glass", (0.0, 6.0, 0.0), 1.5, stained)
     sphere("Ghost", (0.0, 60.0, 0.0), 50.0, bpy.data.materials["faint glow"])
 
 
@@ -500,8 +501,9 @@ def _seen_and_counted():
     fill(tree, glass, {"Base Color": node_of(tree, "VertexColor")})
     solid = principled("solid shadow", Alpha=0.5)
     solid.use_transparent_shadow = False
-    for number, material in enumerate((matcap, islands, stained, solid)):
+    for number, material in enumerate((matcap, islands, solid)):
         plane(material.name, (-5.0, 2.0 * number, 0.0), 1.0, material)
+    cube("stained", (-5.0, 6.0, 0.0), 1.0, stained)
 
 
 def _torn():
@@ -767,7 +769,21 @@ def kinds_of_panes(folder):
     lit = window("lit", lambda tree: node_of(tree, "BsdfPrincipled", **half, Emission_Strength=1.0))
     swapped = window("swapped", lambda tree: node_of(tree, "BsdfGlass", Roughness=0.0), is_swapped=True)
     for number, material in enumerate((window("layered", layered), lit, swapped)):
-        plane(material.name, (2.0 * number, 2.0, 0.0), 1.5, material)
+        box(material.name, (2.0 * number, 2.0, 0.0), (1.5, 1.5, 0.01), material)
+
+
+def sheets_of_glass(folder):
+    """Glass without a back between the camera and even light, from both sides; a ball of the same glass."""
+    scene = new_file()
+    scene.camera.location, scene.camera.rotation_euler = (0.0, 0.0, 6.0), (0.0, 0.0, 0.0)
+    world((0.5, 0.5, 0.5))
+    clear = shader("clear", "BsdfGlass", Roughness=0.0, IOR=1.5)[0]
+    frosted = principled("frosted", (1, 1, 1, 1), Transmission_Weight=1.0, Roughness=0.4, IOR=1.5)
+    for y, material in ((1.0, clear), (-1.0, frosted)):
+        for x, turn in ((-2.0, 0.0), (0.0, math.pi)):
+            sheet = plane(f"{material.name} {x:.0f}", (x, y, 0.0), 1.5, material)
+            sheet.rotation_euler = (turn, 0.0, 0.0)
+    sphere("Ball", (2.0, 1.0, 0.0), 0.7, clear)
 
 
 def _grey(x, _y):

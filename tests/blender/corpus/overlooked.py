@@ -3,7 +3,19 @@
 
 import numpy as np
 
-from corpus.stage import fill, image, light, new_file, node_of, plane, principled, scattering, shader, world
+from corpus.stage import (
+    cube,
+    fill,
+    image,
+    light,
+    new_file,
+    node_of,
+    plane,
+    principled,
+    scattering,
+    shader,
+    world,
+)
 
 
 def overlooked(_folder):
@@ -20,7 +32,8 @@ def overlooked(_folder):
     _falloffs()
     _of_old_files()
     light("SPOT", "Downlight", (0.0, 0.0, 3.0), 50.0, shadow_soft_size=0.1, use_soft_falloff=False)
-    plane("Cover", (0.0, 0.0, 2.9), 0.2, principled("cover", Transmission_Weight=1.0, Roughness=0.0))
+    glass = principled("cover", Transmission_Weight=1.0, Roughness=0.0)
+    cube("Cover", (0.0, 0.0, 2.9), 0.2, glass)
 
 
 def _filtered(scene):
