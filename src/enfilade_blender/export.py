@@ -81,7 +81,7 @@ def export(job: Job) -> dict[str, Any]:
         effect = "every frame would be black: add a lamp, or a world with light"
         notes.add("not-carried", selection.scene.name, "Light", "there is no light", effect)
     shapes.materials.textures.remove_unused(elements)
-    integrator = _integrator(selection, shapes.materials.kinds, notes, is_volumetric=is_volumetric)
+    integrator = _integrator(selection, shapes, notes, is_volumetric=is_volumetric)
     write_scene(job.out / "scene.xml", [integrator, *elements])
     counts = {
         "objects": len(evaluated.placed),
@@ -116,16 +116,17 @@ def _facts(job: Job, selection: Selection) -> dict[str, Any]:
     }
 
 
-def _integrator(selection: Selection, kinds: set[str], notes: Notes, *, is_volumetric: bool) -> Element:
+def _integrator(selection: Selection, shapes: Shapes, notes: Notes, *, is_volumetric: bool) -> Element:
     """A path tracer with the file's limit of bounces.
 
     Cycles limits bounces by kind. A path of many diffuse bounces ends by their own limit, which is the
-    smaller one; glass needs further bounces. Shadow rays of the volumetric path tracer pass cut-outs and
-    lamps, and with it these do not count in the depth of paths.
+    smaller one; glass needs further bounces, and so do plastics, whose reflections are of another kind.
+    Shadow rays of the volumetric path tracer pass cut-outs and lamps, and with it these do not count in the
+    depth of paths.
     """
     cycles = selection.scene.cycles
     bounces = min(cycles.max_bounces, max(cycles.diffuse_bounces, cycles.glossy_bounces))
-    if kinds & GLASS:
+    if shapes.materials.kinds & GLASS:
         bounces = min(cycles.max_bounces, bounces + 2)
         through = min(cycles.max_bounces, cycles.transmission_bounces)
         if through > bounces:
@@ -137,4 +138,6 @@ def _integrator(selection: Selection, kinds: set[str], notes: Notes, *, is_volum
         notes.add(
             "approximated", selection.scene.name, "Light Paths: Diffuse", what, "indirect light is brighter"
         )
+    if shapes.plastic_area > 0.5 * shapes.area:
+        bounces = min(cycles.max_bounces, bounces + 1)
     return plugin("integrator", "volpath" if is_volumetric else "path", max_depth=bounces + 2)

@@ -21,6 +21,8 @@ from enfilade_blender.records import Placed, Selection, View
 from enfilade_blender.scene_xml import LAMP, Element, Identifiers, named, plugin, reference
 from enfilade_blender.sides import Sides, back_of
 
+PLASTICS = {"plastic", "roughplastic"}
+
 
 class Shapes:
     """Writes meshes, and collects elements.
@@ -37,6 +39,8 @@ class Shapes:
         Of BSDFs, shapes and emitters.
     triangles : int
         Those that are written; of instances once.
+    area, plastic_area : float
+        Of all surfaces, and of those with plastics.
     has_unseen_lamps : bool
         Whether there are emitters that the camera does not see.
     """
@@ -46,6 +50,7 @@ class Shapes:
         self.identifiers, self._files = Identifiers(), Identifiers()
         self.materials = MaterialLibrary(job, selection, views, notes, self.identifiers)
         self.triangles = 0
+        self.area = self.plastic_area = 0.0
         self.has_unseen_lamps = False
         (job.out / "meshes").mkdir(exist_ok=True)
 
@@ -89,6 +94,10 @@ class Shapes:
             radiance = self.materials.radiance(identifier)
             mesh = _with_maps(mesh, material.uv, material.attribute)
             is_shared = has_instances and radiance is None
+            area = mesh.transformed(placed.matrices[0]).area() * len(placed.matrices)
+            self.area += area
+            if any(bsdf.get("type") in PLASTICS for bsdf in surface.plain().iter("bsdf")):
+                self.plastic_area += area
             self.triangles += len(mesh) * (1 if is_shared else len(placed.matrices))
             check_triangles(self.triangles, self._limits, placed.name)
             if not placed.has_shadow and not (surface.emitted and surface.bsdf is None):

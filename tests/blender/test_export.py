@@ -446,6 +446,12 @@ def test_a_sequence_of_images_is_baked_as_in_the_first_frame(exported):
     assert bright / dark == pytest.approx((0.955 / 1.055) ** 2.4 / (0.155 / 1.055) ** 2.4, rel=0.05)
 
 
+@pytest.mark.parametrize(("name", "depth"), [("markers", 6), ("lamp_nodes", 7)], ids=["matt", "plastic"])
+def test_paths_are_longer_where_most_surfaces_are_plastics(exported, name, depth):
+    integrator = ET.parse(exported(name)[0] / "scene.xml").find("integrator")
+    assert int(integrator.find("integer[@name='max_depth']").get("value")) == depth
+
+
 def test_a_coat_is_even_over_a_bumpy_base(exported):
     bsdf = ET.parse(exported("left_out")[0] / "scene.xml").find("bsdf[@id='material coated']")
     kinds = [nested.get("type") for nested in bsdf.find("bsdf").findall("bsdf")]

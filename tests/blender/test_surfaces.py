@@ -81,6 +81,31 @@ def test_a_sheet_of_glass_keeps_the_energy_of_light_from_both_sides(context, rou
     assert abs(albedo(glass, context) - 1.0) > 0.3  # of an interface, whose other side undoes that
 
 
+@pytest.mark.parametrize(
+    ("colour", "roughness", "kind"),
+    [
+        (0.8, 0.55, "roughplastic"),
+        (0.8, 0.6, "diffuse"),
+        (0.4, 0.6, "roughplastic"),
+        (0.4, 0.7, "diffuse"),
+        (0.1, 0.7, "roughplastic"),
+        (0.1, 0.8, "diffuse"),
+    ],
+)
+def test_plastic_is_matt_where_its_highlights_are_faint_beside_its_colour(context, colour, roughness, kind):
+    inputs = {"Base Color": Constant((colour,) * 3), "Roughness": Constant((roughness,))}
+    plain = build(Principled(inputs, None, "paint"), context).plain()
+    assert plain.get("type") == kind
+    assert bool(noted(context)) == (kind == "roughplastic" and roughness > 0.55)
+
+
+@pytest.mark.parametrize(("roughness", "share"), [(0.3, 0.031), (0.5, 0.114), (1.0, 0.445)])
+def test_sheen_reflects_the_share_that_it_does_in_cycles(context, roughness, share):
+    black = {"Base Color": Constant((0.0, 0.0, 0.0)), "Specular IOR Level": Constant((0.0,))}
+    sheen = {"Sheen Weight": Constant((1.0,)), "Sheen Roughness": Constant((roughness,))}
+    assert albedo(Principled({**black, **sheen}, None, "cloth"), context) == pytest.approx(share, rel=0.05)
+
+
 GREY, ROUGH = Constant((0.5, 0.5, 0.5)), Constant((0.9,))
 METAL = {"Base Color": GREY, "Metallic": Constant((1.0,)), "Roughness": ROUGH}
 

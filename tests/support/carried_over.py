@@ -30,7 +30,11 @@ PRINCIPLED = (
         "mapped",
         "GGX, alpha its square; with multiple scattering if Multiscatter, but for textured metals and glass",
     ),
-    ("Roughness of 0.55 to 0.8 without Metallic", "approximated", "as of 0.55: highlights are smaller"),
+    (
+        "Roughness of 0.55 to 0.8 without Metallic",
+        "approximated",
+        "bright colours as of 0.8; else as of 0.55: highlights are smaller",
+    ),
     (
         "Roughness of 0.8 and more without Metallic",
         "mapped",
@@ -70,7 +74,7 @@ PRINCIPLED = (
         "`blendbsdf` with a `roughconductor` of k = 0; with a `conductor` over smooth metal and glass",
     ),
     ("Coat Tint, Coat Normal", "not carried", "the coat is clear and even"),
-    ("Sheen", "approximated", "a rough dielectric layer"),
+    ("Sheen", "approximated", "a rough dielectric layer of the same mean albedo"),
     ("Anisotropic", "approximated", "`alpha_u`, `alpha_v` of metals along the UV map; left out if textured"),
     ("Anisotropic Rotation", "not carried", "highlights are stretched along the UV map"),
     ("Specular Tint", "approximated", "on metals a colour at edges; else left out"),
@@ -193,7 +197,7 @@ OBJECTS = (
     (
         "Limits of bounces",
         "approximated",
-        "`max_depth`: the larger of diffuse and glossy; 2 more with glass; all of transparency with `mask`",
+        "`max_depth`: the larger of diffuse and glossy; 1 more among plastics, 2 with glass; all with `mask`",
     ),
     ("Frame step", "not carried", "every frame is rendered"),
     ("Culling of Simplify", "not carried", "all objects are there"),

@@ -32,6 +32,7 @@ EVEN = 0.01  # difference of gains below which they are one number
 ALPHAS = np.linspace(0.0, 1.0, 17)  # at which gains of textured roughness are computed
 ROUGHEST_PLASTIC = 0.55  # rougher interfaces darken at grazing angles in Mitsuba, not in Blender
 MATT = 0.8  # roughness from which a plastic is Lambertian: its reflections can't be told from diffuse ones
+FAINT = 0.15  # highlight of rougher plastics, relative to the diffuse radiance, below which they are so, too
 WHITE = (1.0, 1.0, 1.0)
 NO_INTERFACE = 1.0001  # Mitsuba refuses an index of 1
 TRANSMITTING = {
@@ -111,10 +112,14 @@ def plastic_bsdf(base: Value, roughness: Value, ior: float, context: Context) ->
 def _plastic_of(base: Value, roughness: float, ior: float, context: Context) -> Element:
     roughness = clipped(roughness)
     alpha = min(roughness, ROUGHEST_PLASTIC) ** 2
-    if ROUGHEST_PLASTIC < roughness < MATT:
+    is_rougher = roughness > ROUGHEST_PLASTIC
+    highlight = ((ior - 1.0) / (ior + 1.0)) ** 2 / (4.0 * max(roughness, ROUGHEST_PLASTIC) ** 4)
+    is_faint = highlight < FAINT * Constant(context.textures.mean(base)).number
+    is_matt = roughness >= MATT or (is_rougher and is_faint)
+    if is_rougher and not is_matt:
         what = f"reflections of roughness {ROUGHEST_PLASTIC} to {MATT} are those of {ROUGHEST_PLASTIC}"
         context.notes.add("approximated", context.owner, "Roughness", what, "highlights are smaller")
-    if roughness >= MATT:
+    if is_matt:
         reflected = ggx.mean_reflectance(round(roughness**2, 3), round(ior, 3))
         return plugin("bsdf", "diffuse", reflectance=context.textures.lightened(base, reflected))
     if alpha < SMOOTH:
@@ -290,17 +295,20 @@ def layered(
     roughness: Value,
     tint: tuple[float, float, float],
     context: Context,
+    *,
+    mean: float | None = None,
 ) -> Element:
     """A dielectric layer over a BSDF, which is dimmed by what the layer reflects of uniform light.
 
     A blend weighs the layer by its mean reflectance, which its own reflectance is divided by: the base is
-    dimmed by the rest, and no colour of it is scaled.
+    dimmed by the rest, and no colour of it is scaled. Another `mean` scales the layer.
     """
     alpha = _alpha(roughness, context)
-    mean = ggx.mean_reflectance(round(_typical(alpha, roughness, context), 3), round(ior, 3))
+    own = ggx.mean_reflectance(round(_typical(alpha, roughness, context), 3), round(ior, 3))
+    mean = own if mean is None else mean
     if is_zero(weight) or mean < 1e-3:
         return base
-    reflectance = colour(tint, 1.0 / mean)
+    reflectance = colour(tint, 1.0 / own)
     layer = _microfacets("conductor", alpha, eta=(ior,) * 3, k=(0.0,) * 3, specular_reflectance=reflectance)
     return blended(base, layer, context.textures.scaled_number(weight, mean))
 

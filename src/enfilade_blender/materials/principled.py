@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from enfilade_blender.materials import mapping
 from enfilade_blender.materials.bsdfs import (
     ALMOST,
@@ -22,7 +24,16 @@ from enfilade_blender.materials.values import Constant, Principled
 from enfilade_blender.notes import Kind
 from enfilade_blender.scene_xml import Element, Property
 
-SHEEN_IOR, SHEEN_ROUGHNESS = 1.5, Constant((0.7,))
+# Layers in place of sheen: roughness of the sheen, and what is nearest to the albedo that Cycles 4.5 gives it
+# over directions: the mean albedo, and the index of a dielectric layer of one roughness.
+SHEENS = np.array(
+    [
+        [0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0],
+        [0.0, 0.01, 0.031, 0.066, 0.114, 0.173, 0.24, 0.31, 0.379, 0.445],
+        [1.02, 1.02, 1.02, 1.02, 1.05, 1.1, 1.2, 1.35, 1.5, 2.0],
+    ]
+)
+SHEEN_LAYER = Constant((1.0,))  # roughness
 
 
 def principled_bsdf(shader: Principled, context: Context) -> Element:
@@ -40,7 +51,9 @@ def principled_bsdf(shader: Principled, context: Context) -> Element:
     coat_ior, coat_roughness = shader.number("Coat IOR"), shader["Coat Roughness"]
     whole = layered(whole, shader["Coat Weight"], coat_ior, coat_roughness, WHITE, context)
     tint = context.textures.mean(shader["Sheen Tint"])
-    whole = layered(whole, shader["Sheen Weight"], SHEEN_IOR, SHEEN_ROUGHNESS, tint, context)
+    roughness = Constant(context.textures.mean(shader["Sheen Roughness"])).number
+    mean, ior = (float(np.interp(roughness, SHEENS[0], row)) for row in SHEENS[1:])
+    whole = layered(whole, shader["Sheen Weight"], ior, SHEEN_LAYER, tint, context, mean=mean)
     _note_principled(shader, context)
     return whole
 
@@ -74,7 +87,7 @@ def _note_principled(shader: Principled, context: Context) -> None:
         context.notes.add(kind, context.owner, f"{shader.name}: {name}", what, effect)
 
     effects: dict[str, tuple[str, str]] = {
-        "Sheen Weight": ("a rough dielectric layer", "brightness of edges differs a little"),
+        "Sheen Weight": ("a rough dielectric layer", "edges are a little darker"),
         "Subsurface Weight": ("diffuse reflection", "light does not spread below the surface"),
         "Thin Film Thickness": ("the thin film is left out", "there are no interference colours"),
         "Diffuse Roughness": ("the roughness of diffuse reflection is left out", "the surface is Lambertian"),

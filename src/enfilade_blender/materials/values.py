@@ -12,7 +12,7 @@ IDENTITY: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 WITHOUT_EFFECT = {  # inputs of the Principled BSDF that a weight of 0 leaves without effect
     "Emission Strength": ("Emission Color",),
     "Coat Weight": ("Coat Roughness", "Coat IOR", "Coat Tint"),
-    "Sheen Weight": ("Sheen Tint",),
+    "Sheen Weight": ("Sheen Tint", "Sheen Roughness"),
     "Anisotropic": ("Anisotropic Rotation",),
 }
 LUMINANCE = (0.2126729, 0.7151522, 0.0721749)  # of linear Rec.709, in Cycles
@@ -20,8 +20,8 @@ PRINCIPLED = {  # inputs that are read, of which Blender 4.2 has not all; and nu
     "Base Color": 0.8, "Metallic": 0.0, "Roughness": 0.5, "IOR": 1.45, "Alpha": 1.0, "Diffuse Roughness": 0.0,
     "Subsurface Weight": 0.0, "Specular IOR Level": 0.5, "Specular Tint": 1.0, "Anisotropic": 0.0,
     "Transmission Weight": 0.0, "Coat Weight": 0.0, "Coat Roughness": 0.03, "Coat IOR": 1.5, "Coat Tint": 1.0,
-    "Sheen Weight": 0.0, "Sheen Tint": 1.0, "Emission Color": 1.0, "Emission Strength": 0.0,
-    "Thin Film Thickness": 0.0, "Anisotropic Rotation": 0.0,
+    "Sheen Weight": 0.0, "Sheen Tint": 1.0, "Sheen Roughness": 0.5, "Emission Color": 1.0,
+    "Emission Strength": 0.0, "Thin Film Thickness": 0.0, "Anisotropic Rotation": 0.0,
 }  # fmt: skip
 
 

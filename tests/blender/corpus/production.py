@@ -18,7 +18,7 @@ def production(folder):
     _without_shadows()
     _hidden()
     _tiled(folder)
-    plane("Satin", (0.0, 2.0, 0.0), 1.0, principled("satin", Roughness=0.7))
+    plane("Satin", (0.0, 2.0, 0.0), 1.0, principled("satin", (0.2, 0.2, 0.2, 1), Roughness=0.7))
     plane(
         "Lacquer",
         (2.0, 2.0, 0.0),

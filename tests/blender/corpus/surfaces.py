@@ -236,7 +236,7 @@ def mapped_images(folder):
 
 def procedural(folder):
     stage()
-    noise, tree, node = shader("noise", "BsdfPrincipled", Roughness=0.7)
+    noise, tree, node = shader("noise", "BsdfPrincipled", Roughness=0.5)
     ramp = node_of(tree, "ValToRGB", Fac=node_of(tree, "TexNoise", Scale=4.0))
     ramp.color_ramp.elements[0].color = (0.5, 0.1, 0.05, 1)
     ramp.color_ramp.elements[1].color = (0.9, 0.8, 0.5, 1)
