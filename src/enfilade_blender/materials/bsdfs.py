@@ -32,7 +32,7 @@ EVEN = 0.01  # difference of gains below which they are one number
 ALPHAS = np.linspace(0.0, 1.0, 17)  # at which gains of textured roughness are computed
 ROUGHEST_PLASTIC = 0.55  # rougher interfaces darken at grazing angles in Mitsuba, not in Blender
 MATT = 0.8  # roughness from which a plastic is Lambertian: its reflections can't be told from diffuse ones
-FAINT = 0.15  # highlight of rougher plastics, relative to the diffuse radiance, below which they are so, too
+FAINT = 0.08  # highlight of rougher plastics, relative to the diffuse radiance, below which they are so, too
 WHITE = (1.0, 1.0, 1.0)
 NO_INTERFACE = 1.0001  # Mitsuba refuses an index of 1
 TRANSMITTING = {
@@ -114,7 +114,7 @@ def _plastic_of(base: Value, roughness: float, ior: float, context: Context) -> 
     alpha = min(roughness, ROUGHEST_PLASTIC) ** 2
     is_rougher = roughness > ROUGHEST_PLASTIC
     highlight = ((ior - 1.0) / (ior + 1.0)) ** 2 / (4.0 * max(roughness, ROUGHEST_PLASTIC) ** 4)
-    is_faint = highlight < FAINT * Constant(context.textures.mean(base)).number
+    is_faint = highlight < FAINT * _darkest(base, context)
     is_matt = roughness >= MATT or (is_rougher and is_faint)
     if is_rougher and not is_matt:
         what = f"reflections of roughness {ROUGHEST_PLASTIC} to {MATT} are those of {ROUGHEST_PLASTIC}"
@@ -130,6 +130,13 @@ def _plastic_of(base: Value, roughness: float, ior: float, context: Context) -> 
         "bsdf", "roughplastic", distribution="ggx", alpha=alpha, int_ior=ior, ext_ior=1.0,
         diffuse_reflectance=reflectance,
     )  # fmt: skip
+
+
+def _darkest(value: Value, context: Context) -> float:
+    """Luminance of a colour, or of the darkest tenth of an image's pixels."""
+    if isinstance(value, ImageValue | Texture) and context.textures.has_pixels(value):
+        return float(np.percentile(context.textures.numbers(value), 10.0))
+    return Constant(context.textures.mean(value)).number
 
 
 def _two_roughnesses(roughness: Value, context: Context) -> tuple[float, float, Element | float]:
