@@ -65,6 +65,7 @@ def open_source(job: Job, notes: Notes) -> Selection:
             f"Blender can't open it: {reason}", str(job.source), "open it in Blender, and save it again"
         ) from error
     _note_newer(notes)
+    _leave_modes()
     _detach_images(job, notes)
     _settle_alpha()
     _show_in_viewports()
@@ -72,6 +73,20 @@ def open_source(job: Job, notes: Notes) -> Selection:
         _take_camera(notes)
         _note_defaults(job, notes)
     return _select(job)
+
+
+def _leave_modes() -> None:
+    """Leave Edit Mode, in which meshes are empty, in all view layers."""
+    window = bpy.context.window
+    shown = window.scene, window.view_layer
+    for scene in bpy.data.scenes:
+        for layer in scene.view_layers:
+            edited = [obj for obj in layer.objects if obj.mode == "EDIT"]
+            if edited:
+                window.scene, window.view_layer = scene, layer
+                layer.objects.active = edited[0]
+                bpy.ops.object.mode_set(mode="OBJECT")
+    window.scene, window.view_layer = shown
 
 
 def files_used(job: Job) -> list[str]:
@@ -194,11 +209,13 @@ def _show_in_viewports() -> None:
 
 
 def _check_libraries(job: Job) -> None:
-    """Refuse libraries of other folders, or that are missing, but for such that nothing is linked from.
+    """Refuse libraries of other folders, or that are missing, but for such that no data is linked from.
 
-    From Blender 5 on data may be packed into the file, as those of the essential assets are.
+    From Blender 5 on data may be packed into the file, as those of the essential assets are. A file that was
+    saved while something was painted or sculpted links Blender's own brushes.
     """
-    linked = {of.library for of in bpy.data.user_map() if not getattr(of, "is_linked_packed", False)}
+    data = [of for of in bpy.data.user_map() if of.id_type != "BRUSH"]
+    linked = {of.library for of in data if not getattr(of, "is_linked_packed", False)}
     for library in (library for library in bpy.data.libraries if library in linked):
         file = Path(bpy.path.abspath(library.filepath)).resolve()
         if not is_allowed(file, job):

@@ -189,6 +189,12 @@ def test_a_mix_with_transparent_by_the_kind_of_ray_is_its_other_side(blender):
     assert ray["effect"] == "all rays see it as those do in Blender for which that is 0"
 
 
+def test_a_file_that_was_saved_in_edit_mode_has_its_meshes(blender):
+    code, out, result = blender.job(blender.make("left_in_edit_mode")[0], "left in edit mode")
+    assert code == 0, result
+    assert {file.stem for file in (out / "meshes").iterdir()} == {"Plain", "Rounded"}
+
+
 def test_glass_without_a_back_is_thin(blender):
     code, out, result = blender.job(blender.make("sheets_of_glass")[0], "sheets of glass")
     assert code == 0, result

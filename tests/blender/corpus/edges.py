@@ -772,6 +772,16 @@ def kinds_of_panes(folder):
         box(material.name, (2.0 * number, 2.0, 0.0), (1.5, 1.5, 0.01), material)
 
 
+def left_in_edit_mode(_folder):
+    """Two objects, one of them with a modifier, in a file that is saved in Edit Mode."""
+    new_file()
+    plane("Plain", (0.0, 0.0, 0.0), 1.0, None)
+    cube("Rounded", (2.0, 0.0, 0.0), 1.0, None).modifiers.new("Bevel", "BEVEL")
+    for name in ("Plain", "Rounded"):
+        bpy.data.objects[name].select_set(True)
+    bpy.ops.object.mode_set(mode="EDIT")
+
+
 def sheets_of_glass(folder):
     """Glass without a back between the camera and even light, from both sides; a ball of the same glass."""
     scene = new_file()
