@@ -11,10 +11,9 @@ import numpy as np
 from enfilade_blender.copies import arranged, is_instanced, triangle_count
 from enfilade_blender.evaluate import check_triangles
 from enfilade_blender.job import Job
-from enfilade_blender.materials.bsdfs import is_one
 from enfilade_blender.materials.library import MaterialLibrary, Part, PartMaterial
 from enfilade_blender.materials.textures import file_stem
-from enfilade_blender.materials.values import has_panes, normals_of
+from enfilade_blender.materials.values import has_panes, is_one, normals_of
 from enfilade_blender.notes import Notes, report_progress
 from enfilade_blender.ply import Mesh, joined, write_ply
 from enfilade_blender.records import Placed, Selection, View

@@ -9,7 +9,8 @@ import pytest
 
 from enfilade_blender.lights import area_radiance, point_intensity, sphere_radiance
 from enfilade_blender.materials import mapping
-from enfilade_blender.materials.bsdfs import Context, plastic_bsdf
+from enfilade_blender.materials.bsdfs import plastic_bsdf
+from enfilade_blender.materials.context import Context
 from enfilade_blender.materials.graph import Graph
 from enfilade_blender.materials.links import depends_on_place
 from enfilade_blender.materials.surfaces import inverted

@@ -9,7 +9,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from enfilade_blender.materials.bsdfs import Context, with_normal
+from enfilade_blender.materials.bsdfs import with_normal
+from enfilade_blender.materials.context import Context
 from enfilade_blender.materials.surfaces import build
 from enfilade_blender.materials.textures import Textures
 from enfilade_blender.materials.values import (

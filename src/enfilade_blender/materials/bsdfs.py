@@ -1,18 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""BSDFs of Mitsuba for Blender's lobes."""
+"""Mitsuba's BSDFs of lobes, plastics and layers, their blends, and normals."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import replace
 
 import numpy as np
 
 from enfilade_blender.materials import ggx, mapping
+from enfilade_blender.materials.context import Context
+from enfilade_blender.materials.microfacets import (
+    SMOOTH,
+    WHITE,
+    alpha_of,
+    clipped,
+    conductor_bsdf,
+    glass_bsdf,
+    microfacet_bsdf,
+)
 from enfilade_blender.materials.table import LOBES
-from enfilade_blender.materials.textures import Textures
 from enfilade_blender.materials.values import (
+    ALMOST,
     AttributeValue,
     Bump,
     Constant,
@@ -23,17 +32,14 @@ from enfilade_blender.materials.values import (
     ProceduralNormal,
     Texture,
     Value,
+    is_one,
+    is_zero,
 )
-from enfilade_blender.notes import Notes
-from enfilade_blender.scene_xml import Element, Property, colour, plugin
+from enfilade_blender.scene_xml import Element, colour, plugin
 
-SMOOTH = 1e-3  # alpha below which a surface is a mirror; the least of textures
-EVEN = 0.01  # difference of gains below which they are one number
-ALPHAS = np.linspace(0.0, 1.0, 17)  # at which gains of textured roughness are computed
 ROUGHEST_PLASTIC = 0.55  # rougher interfaces darken at grazing angles in Mitsuba, not in Blender
 MATT = 0.8  # roughness from which a plastic is Lambertian: its reflections can't be told from diffuse ones
 FAINT = 0.08  # highlight of rougher plastics, relative to the diffuse radiance, below which they are so, too
-WHITE = (1.0, 1.0, 1.0)
 NO_INTERFACE = 1.0001  # Mitsuba refuses an index of 1
 TRANSMITTING = {
     "principledthin",
@@ -47,22 +53,6 @@ TRANSMITTING = {
 DIFFUSE = {"diffuse", "plastic", "roughplastic", "blendbsdf"}  # plastics are so for the most part
 DELTA = {"conductor", "dielectric", "thindielectric", "null"}  # without rough lobes
 ROUGHENED = {"conductor", "dielectric", "plastic"}  # smooth ones that have a rough counterpart
-SHEET_ROUGHNESS = 0.7  # of a thin pane that spreads what passes it as one interface does
-ALMOST = 0.995  # weights above are 1, below the rest 0
-
-
-@dataclass(frozen=True)
-class Context:
-    """What all functions of this module need: the material's name, textures and notes; how normals lie."""
-
-    owner: str
-    textures: Textures
-    notes: Notes
-    is_mirrored: bool = False  # the UV map, below normal maps
-    is_back: bool = False  # the side of a surface that normals point away from
-    is_solid: bool = False  # the object is closed, and no pane
-    is_sheet: bool = False  # glass without a back
-    uv_density: float = 1.0  # texture coordinates for each scene unit
 
 
 def lobe_bsdf(lobe: Lobe, context: Context) -> Element:
@@ -166,128 +156,6 @@ def two_sided(bsdf: Element, back: Element | None = None) -> Element:
     return bsdf
 
 
-def is_one(value: Value) -> bool:
-    """Whether a weight is 1 everywhere."""
-    return isinstance(value, Constant) and value.number >= ALMOST
-
-
-def is_zero(value: Value) -> bool:
-    """Whether a weight is 0 everywhere."""
-    return isinstance(value, Constant) and value.number <= 1.0 - ALMOST
-
-
-def glass_bsdf(
-    transmitted: Value | Element, reflected: Value, roughness: Value, ior: float, context: Context,
-    *, is_multiple: bool,
-) -> Element:  # fmt: skip
-    """Glass of two tints; of rough glass, constant ones restore the energy that single scattering loses.
-
-    Without `is_multiple` Blender loses it, too.
-    """
-    ior = ior if abs(ior - 1.0) > 1e-3 else 1.001
-    if context.is_sheet:
-        return _sheet_of_glass(transmitted, reflected, roughness, ior, context)
-    alpha = _alpha(roughness, context)
-    tints: dict[str, Property] = {}
-    values = {"specular_transmittance": transmitted, "specular_reflectance": reflected}
-    for number, (name, value) in enumerate(values.items()):
-        tint: Property
-        if isinstance(value, Constant):
-            gain = partial(_glass_gain, ior, number, is_multiple=is_multiple)
-            kind = f"{name} {ior:.3g}{' multiple' * is_multiple}"
-            tint = _gained(value.colour, gain, alpha, roughness, kind, context)
-        else:
-            tint = value if isinstance(value, Element) else context.textures.colour(value)
-        if tint != WHITE:
-            tints[name] = tint
-    return _microfacets("dielectric", alpha, int_ior=ior, ext_ior=1.0, **tints)
-
-
-def _sheet_of_glass(
-    transmitted: Value | Element, reflected: Value, roughness: Value, ior: float, context: Context
-) -> Element:
-    """Glass with one interface, as thin glass: Mitsuba's interfaces change radiance by the squared index."""
-    what, effect = "glass of an open mesh is a thin pane", "nothing is bent behind it, and light passes"
-    context.notes.add("approximated", context.owner, "Glass", what, effect)
-    through, back = (
-        value if isinstance(value, Element) else context.textures.colour(value)
-        for value in (transmitted, reflected)
-    )
-    if isinstance(roughness, Constant) and clipped(roughness.number) ** 2 < SMOOTH:
-        tints = {"specular_transmittance": through, "specular_reflectance": back}
-        return plugin("bsdf", "thindielectric", int_ior=mapping.thin_ior(ior), ext_ior=1.0, **tints)
-    rough = context.textures.scaled_number(roughness, SHEET_ROUGHNESS)
-    return plugin(
-        "bsdf", "principledthin", base_color=through, roughness=rough, spec_trans=1.0, eta=max(ior, 1.0 / ior)
-    )
-
-
-def _glass_gain(ior: float, number: int, alpha: float, *, is_multiple: bool) -> float:
-    return ggx.glass_gains(round(alpha, 3), round(ior, 3))[number] if is_multiple else 1.0
-
-
-def conductor_bsdf(
-    reflectance: Value, roughness: Value, extra: dict[str, Property], context: Context,
-    *, edge: tuple[float, float, float] | None, is_multiple: bool,
-) -> Element:  # fmt: skip
-    """A metal, whose index of refraction is fitted where there are an edge tint and a constant colour.
-
-    Without `is_multiple` it loses light between its microfacets, as in Blender.
-    """
-    alpha = _alpha(roughness, context)
-    optics: dict[str, Property] = {"material": "none"}
-    if isinstance(reflectance, Constant):
-        r = np.clip(np.array(reflectance.colour), 0.0, 1.0)
-        tint = r
-        if edge is not None:
-            eta, k = mapping.conductor_ior(r, np.array(edge))
-            optics, tint = {"eta": _unbounded(eta), "k": _unbounded(k)}, np.ones(3)
-
-        def gain(alpha: float) -> np.ndarray:
-            return np.array([ggx.metal_scale(float(c), alpha) if is_multiple else 1.0 for c in r])
-
-        name = "metal" + "".join(f" {c:.3g}" for c in r) + " multiple" * is_multiple
-        optics["specular_reflectance"] = _gained(_unbounded(tint), gain, alpha, roughness, name, context)
-    else:
-        optics["specular_reflectance"] = context.textures.colour(reflectance)
-    return _microfacets("conductor", alpha, extra, **optics)
-
-
-def _microfacets(
-    kind: str, alpha: float | Element, extra: dict[str, Property] | None = None, **optics: Property
-) -> Element:
-    """A smooth BSDF, or a rough one of GGX microfacets, whose `extra` alphas stand in place of the one."""
-    if isinstance(alpha, float) and alpha < SMOOTH:
-        return plugin("bsdf", kind, **optics)
-    return plugin("bsdf", f"rough{kind}", distribution="ggx", **(extra or {"alpha": alpha}), **optics)
-
-
-def _alpha(roughness: Value, context: Context) -> float | Element:
-    """GGX alpha: the roughness squared, also of a texture."""
-    if isinstance(roughness, Constant):
-        return clipped(roughness.number) ** 2
-    if context.textures.has_pixels(roughness):
-        inside = np.clip(context.textures.numbers(roughness), 0.0, 1.0)
-        return context.textures.rewritten(roughness, np.maximum(inside**2, SMOOTH), "alpha")
-    return 0.25
-
-
-def _gained(
-    tint: tuple[float, float, float], gain: Callable[[float], float | np.ndarray], alpha: float | Element,
-    roughness: Value, name: str, context: Context,
-) -> Property:  # fmt: skip
-    """A reflectance times its gain at an alpha; a texture where the roughness is one."""
-    if isinstance(alpha, float) or not context.textures.has_pixels(roughness):
-        return colour(np.array(tint) * (gain(alpha) if isinstance(alpha, float) else 1.0))
-    gains = np.array([np.broadcast_to(gain(float(a)), 3) for a in ALPHAS])
-    alphas = np.clip(context.textures.numbers(roughness)[..., 0], 0.0, 1.0) ** 2
-    image = np.stack([np.interp(alphas, ALPHAS, gains[:, c]) for c in range(3)], axis=-1)
-    if np.ptp(image, axis=(0, 1)).max() < EVEN:
-        return colour(np.array(tint) * image.mean(axis=(0, 1)).round(2))  # of objects that can share it
-    name = " ".join([name, *(f"{c:.3g}" for c in tint)])
-    return context.textures.rewritten(roughness, image * np.array(tint), name)
-
-
 def _typical(alpha: float | Element, roughness: Value, context: Context) -> float:
     """An alpha; that of the mean roughness of a texture."""
     if isinstance(alpha, float):
@@ -310,13 +178,15 @@ def layered(
     A blend weighs the layer by its mean reflectance, which its own reflectance is divided by: the base is
     dimmed by the rest, and no colour of it is scaled. Another `mean` scales the layer.
     """
-    alpha = _alpha(roughness, context)
+    alpha = alpha_of(roughness, context)
     own = ggx.mean_reflectance(round(_typical(alpha, roughness, context), 3), round(ior, 3))
     mean = own if mean is None else mean
     if is_zero(weight) or mean < 1e-3:
         return base
     reflectance = colour(tint, 1.0 / own)
-    layer = _microfacets("conductor", alpha, eta=(ior,) * 3, k=(0.0,) * 3, specular_reflectance=reflectance)
+    layer = microfacet_bsdf(
+        "conductor", alpha, eta=(ior,) * 3, k=(0.0,) * 3, specular_reflectance=reflectance
+    )
     return blended(base, layer, context.textures.scaled_number(weight, mean))
 
 
@@ -398,12 +268,3 @@ def blended(first: Element, second: Element, weight: Element | float) -> Element
                 bsdf.set("type", f"rough{bsdf.get('type')}")
                 bsdf.extend(plugin("bsdf", "", distribution="ggx", alpha=SMOOTH))
     return plugin("bsdf", "blendbsdf", first, second, weight=weight)
-
-
-def clipped(roughness: float) -> float:
-    """Roughness as Blender takes it."""
-    return min(max(roughness, 0.0), 1.0)
-
-
-def _unbounded(values: np.ndarray) -> tuple[float, float, float]:
-    return float(values[0]), float(values[1]), float(values[2])

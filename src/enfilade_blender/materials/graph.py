@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any
 
 from enfilade_blender.materials import table
-from enfilade_blender.materials.bsdfs import is_one, is_zero
 from enfilade_blender.materials.links import dependence, follow, image_coordinates, upstream
 from enfilade_blender.materials.values import (
     PRINCIPLED,
@@ -31,6 +30,8 @@ from enfilade_blender.materials.values import (
     Shader,
     Value,
     bumped,
+    is_one,
+    is_zero,
     normals_of,
 )
 from enfilade_blender.notes import Notes

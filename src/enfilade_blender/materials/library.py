@@ -11,7 +11,7 @@ from typing import Any
 from enfilade_blender.job import Job
 from enfilade_blender.materials.atlas import share_bsdfs
 from enfilade_blender.materials.bake import Bakery
-from enfilade_blender.materials.bsdfs import Context
+from enfilade_blender.materials.context import Context
 from enfilade_blender.materials.graph import Graph, as_pane
 from enfilade_blender.materials.links import is_of_object
 from enfilade_blender.materials.surfaces import Surface, build

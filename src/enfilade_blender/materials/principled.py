@@ -6,21 +6,10 @@ from __future__ import annotations
 import numpy as np
 
 from enfilade_blender.materials import mapping
-from enfilade_blender.materials.bsdfs import (
-    ALMOST,
-    SMOOTH,
-    WHITE,
-    Context,
-    blend,
-    clipped,
-    conductor_bsdf,
-    glass_bsdf,
-    is_zero,
-    layered,
-    plastic_bsdf,
-    with_normal,
-)
-from enfilade_blender.materials.values import Constant, Principled
+from enfilade_blender.materials.bsdfs import blend, layered, plastic_bsdf, with_normal
+from enfilade_blender.materials.context import Context
+from enfilade_blender.materials.microfacets import SMOOTH, WHITE, clipped, conductor_bsdf, glass_bsdf
+from enfilade_blender.materials.values import ALMOST, Constant, Principled, is_zero
 from enfilade_blender.notes import Kind
 from enfilade_blender.scene_xml import Element, Property
 

@@ -14,20 +14,18 @@ import numpy as np
 from enfilade_blender.image_files import F32
 from enfilade_blender.materials import mapping
 from enfilade_blender.materials.bsdfs import (
-    ALMOST,
-    Context,
     blended,
-    glass_bsdf,
-    is_one,
-    is_zero,
     layered,
     lobe_bsdf,
     plastic_bsdf,
     two_sided,
     with_normal,
 )
+from enfilade_blender.materials.context import Context
+from enfilade_blender.materials.microfacets import glass_bsdf
 from enfilade_blender.materials.principled import principled_bsdf
 from enfilade_blender.materials.values import (
+    ALMOST,
     Add,
     Constant,
     Emission,
@@ -39,6 +37,8 @@ from enfilade_blender.materials.values import (
     Shader,
     Texture,
     Value,
+    is_one,
+    is_zero,
 )
 from enfilade_blender.scene_xml import Element, plugin
 

@@ -15,6 +15,7 @@ WITHOUT_EFFECT = {  # inputs of the Principled BSDF that a weight of 0 leaves wi
     "Sheen Weight": ("Sheen Tint", "Sheen Roughness"),
     "Anisotropic": ("Anisotropic Rotation",),
 }
+ALMOST = 0.995  # weights above are 1, below the rest 0
 LUMINANCE = (0.2126729, 0.7151522, 0.0721749)  # of linear Rec.709, in Cycles
 PRINCIPLED = {  # inputs that are read, of which Blender 4.2 has not all; and numbers in place of a texture
     "Base Color": 0.8, "Metallic": 0.0, "Roughness": 0.5, "IOR": 1.45, "Alpha": 1.0, "Diffuse Roughness": 0.0,
@@ -253,6 +254,16 @@ class Nothing:
 
 
 Shader = Principled | Lobe | Emission | Mix | Add | Nothing
+
+
+def is_one(value: Value) -> bool:
+    """Whether a weight is 1 everywhere."""
+    return isinstance(value, Constant) and value.number >= ALMOST
+
+
+def is_zero(value: Value) -> bool:
+    """Whether a weight is 0 everywhere."""
+    return isinstance(value, Constant) and value.number <= 1.0 - ALMOST
 
 
 def bumped(shader: Shader, bumps: Bump) -> Shader:
