@@ -32,7 +32,7 @@ IMPORTERS: dict[str, Callable[..., Any]] = {
 HAVE_RATE = (".fbx", ".usd", ".usda", ".usdc", ".usdz")  # others have no frame rate
 ALPHA_OF_FILES = {  # modes by the endings of files
     ".exr": "PREMUL",
-    **dict.fromkeys((".png", ".webp", ".tga", ".bmp", ".jpg", ".jpeg"), "STRAIGHT"),
+    **dict.fromkeys((".png", ".webp", ".jp2", ".j2c", ".tga", ".bmp", ".jpg", ".jpeg"), "STRAIGHT"),
 }
 IMAGE_FILES = ("FILE", "SEQUENCE", "MOVIE", "TILED")  # sources of images that are read from the disk
 

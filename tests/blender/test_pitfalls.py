@@ -103,9 +103,13 @@ def test_an_image_is_read_by_its_content_not_by_its_name(exported):
     assert file.read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize(("name", "stored"), [("png", 255 * 0.5 * 0.4), ("exr", 0.2140)])
+@pytest.mark.parametrize(
+    ("name", "stored"),
+    [("png", 255 * 0.5 * 0.4), ("exr", 0.2140), ("webp", 255 * 0.5), ("jp2", 255 * 0.5)],
+)
 def test_a_file_decides_on_alpha_and_its_colour_space_on_colours(shapes, name, stored):
-    # Cycles takes alpha of PNG files as straight, and decodes EXR files as they are told.
+    # Cycles takes alpha of PNG files as straight, that of WebP and JPEG 2000 as multiplied into the colours,
+    # and decodes EXR files as they are told.
     texture = mi.traverse(shapes[f"Contrary {name}"].bsdf())
     data = next(value for key, value in texture if key.endswith("data"))
     assert np.array(data)[..., :3].mean() == pytest.approx(stored, rel=0.01)

@@ -12,6 +12,7 @@ from enfilade_blender.image_files import F32
 
 RAW_SPACES = ("Non-Color", "Raw", "Linear Rec.709", "Linear")
 FRAMES = ("SEQUENCE", "MOVIE")  # sources whose pixels Blender has for a node alone, which chooses the frame
+ASSOCIATED = ("WEBP", "JPEG2000")  # kinds of files
 OPAQUE_DEPTHS = (8, 24)  # bits of a pixel without alpha
 
 
@@ -52,16 +53,18 @@ def image_colours(node: Any) -> F32:
     """Linear RGB of an image node (H, W, 3), the first row on top, as Cycles has it.
 
     Colours are multiplied by alpha, before they are decoded, unless the node's output Alpha is used. Blender
-    keeps images of bytes without that product, and those of floats with it.
+    keeps images of bytes without that product, and those of floats with it. Cycles takes the colours of WebP
+    and JPEG 2000 files for multiplied, whatever they are.
     """
     image = node.image
     rgba = _stored_pixels(image)
     colours, alpha = rgba[..., :3], rgba[..., 3:]
     if _has_alpha(image):
         is_alone = not node.outputs["Alpha"].is_linked
-        if is_alone and not image.is_float:
+        is_associated = image.is_float or _is_file_associated(image)
+        if is_alone and not is_associated:
             colours = colours * alpha
-        elif image.is_float and not is_alone:
+        elif is_associated and not is_alone:
             colours = colours / np.where(alpha > 0.0, alpha, 1.0).astype(np.float32)
     return np.ascontiguousarray(_decoded(colours, image))
 
@@ -72,10 +75,17 @@ def _has_alpha(image: Any) -> bool:
     return not is_channel and image.depth not in OPAQUE_DEPTHS
 
 
+def _is_file_associated(image: Any) -> bool:
+    """Whether Cycles takes alpha as multiplied into the colours of an image's file, for the kind of file."""
+    is_file = image.source in ("FILE", "TILED") and not image.packed_files
+    return is_file and image.file_format in ASSOCIATED
+
+
 def is_as_stored(node: Any) -> bool:
     """Whether an image node's colours are those of the image's file."""
     image = node.image
-    if not _has_alpha(image) or (image.alpha_mode == "PREMUL") != node.outputs["Alpha"].is_linked:
+    is_associated = image.alpha_mode == "PREMUL" or _is_file_associated(image)
+    if not _has_alpha(image) or is_associated != node.outputs["Alpha"].is_linked:
         return True
     return bool(_stored_pixels(image)[..., 3].min() >= 1.0)
 

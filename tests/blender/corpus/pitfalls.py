@@ -216,11 +216,18 @@ def _image_of_another_kind(folder):
 
 
 def _alpha_and_colours_against_the_file(folder):
-    """A premultiplied PNG file of 0.5 and alpha 0.4, and an EXR file of 0.5 whose colour space is sRGB."""
-    for name, kind, settings in (("png", "PNG", {"alpha_mode": "PREMUL"}), ("exr", "OPEN_EXR", {})):
-        value = bpy.data.images.new(name, 8, 8, alpha=kind == "PNG", float_buffer=kind != "PNG")
+    """Files of 0.5 and alpha 0.4, the PNG as premultiplied, and an EXR file of 0.5 that is read as sRGB."""
+    premultiplied = {"alpha_mode": "PREMUL"}
+    kinds = (
+        ("png", "PNG", premultiplied),
+        ("exr", "OPEN_EXR", {}),
+        ("webp", "WEBP", {}),
+        ("jp2", "JPEG2000", {}),
+    )
+    for place, (name, kind, settings) in enumerate(kinds, 1):
+        value = bpy.data.images.new(name, 64, 64, alpha=kind != "OPEN_EXR", float_buffer=kind == "OPEN_EXR")
         value.colorspace_settings.name = "Non-Color"
-        value.pixels = 64 * [0.5, 0.5, 0.5, 0.4 if kind == "PNG" else 1.0]
+        value.pixels = 64 * 64 * [0.5, 0.5, 0.5, 1.0 if kind == "OPEN_EXR" else 0.4]
         value.file_format, value.filepath_raw = kind, str(folder / f"contrary.{name}")
         value.save()
         bpy.data.images.remove(value)
@@ -228,5 +235,4 @@ def _alpha_and_colours_against_the_file(folder):
         file.colorspace_settings.name = "sRGB"
         for key, mode in settings.items():
             setattr(file, key, mode)
-        x = 1.0 if kind == "PNG" else 2.0
-        cube(f"Contrary {name}", (x, 1.5, 0.25), 0.5, shader(name, "BsdfDiffuse", Color=file)[0])
+        cube(f"Contrary {name}", (float(place), 1.5, 0.25), 0.5, shader(name, "BsdfDiffuse", Color=file)[0])
