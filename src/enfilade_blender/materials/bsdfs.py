@@ -106,9 +106,11 @@ def _plastic_of(base: Value, roughness: float, ior: float, context: Context) -> 
     highlight = ((ior - 1.0) / (ior + 1.0)) ** 2 / (4.0 * max(roughness, ROUGHEST_PLASTIC) ** 4)
     is_faint = highlight < FAINT * _darkest(base, context)
     is_matt = roughness >= MATT or (is_rougher and is_faint)
-    if is_rougher and not is_matt:
-        what = f"reflections of roughness {ROUGHEST_PLASTIC} to {MATT} are those of {ROUGHEST_PLASTIC}"
-        context.notes.add("approximated", context.owner, "Roughness", what, "highlights are smaller")
+    if is_rougher and roughness < MATT:
+        taken = "diffuse, as they are faint" if is_faint else f"those of {ROUGHEST_PLASTIC}"
+        what = f"reflections of roughness {ROUGHEST_PLASTIC} to {MATT} are {taken}"
+        effect = "highlights are missing" if is_faint else "highlights are smaller"
+        context.notes.add("approximated", context.owner, "Roughness", what, effect)
     if is_matt:
         reflected = ggx.mean_reflectance(round(roughness**2, 3), round(ior, 3))
         return plugin("bsdf", "diffuse", reflectance=context.textures.lightened(base, reflected))
