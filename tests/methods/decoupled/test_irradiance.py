@@ -51,14 +51,26 @@ def test_what_comes_into_view_between_two_keyframes_has_no_more_grain_than_keyfr
         placed("rectangle", "wall", (0, 0, -2), DIFFUSE, 6),
         placed("cube", "floor", (0, -8, 0), DIFFUSE, 6),
     )
-    cameras = tuple(Camera(look_at((0, 0, 4), (0, y, -2)), 40, *SIZE) for y in (0.0, 1.5, 0.0))
-    path = CameraPath(cameras, (1, 2, 3), 24.0)
-    settings = {"decoupled": {"irradiance_spp": 8}, "keyframes": {"placement": "uniform", "spacing": 2}}
-    results = run_passes(Decoupled(), walk_of(path, opened(write(tmp_path, *shapes)), **settings))
+    results = panned(tmp_path, shapes, 1.5, SIZE)
     strip, keyframe = results.record("disocclusion", 1), results.record("irradiance", 0)
 
     assert 0.1 < strip.is_known.mean() < 0.4
     assert grain(strip) < 1.5 * grain(keyframe)
+
+
+def test_a_narrow_strip_that_comes_into_view_has_an_image(tmp_path):
+    # Two rows of 480: what the hash grid has in its place shows its entries.
+    wall = placed("rectangle", "wall", (0, 0, -2), DIFFUSE, 60)
+    strip = panned(tmp_path, [wall], 0.015, (64, 240)).record("disocclusion", 1)
+    assert 1e-3 < strip.is_known.mean() < 5e-3
+
+
+def panned(folder, shapes, up, size):
+    """Passes of a shot that looks at a wall, `up` beside its middle in the frame between two keyframes."""
+    cameras = tuple(Camera(look_at((0, 0, 4), (0, y, -2)), 40, *size) for y in (0.0, up, 0.0))
+    path = CameraPath(cameras, (1, 2, 3), 24.0)
+    settings = {"decoupled": {"irradiance_spp": 8}, "keyframes": {"placement": "uniform", "spacing": 2}}
+    return run_passes(Decoupled(), walk_of(path, opened(write(folder, *shapes)), **settings))
 
 
 def grain(image):
