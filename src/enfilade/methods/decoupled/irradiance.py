@@ -17,7 +17,7 @@ from enfilade.records import Mask
 from enfilade.renderer import Purpose
 
 NARROW_PATHS = 4  # times the paths of a pixel, on narrow surfaces: a denoiser leaves their noise
-MIN_DISOCCLUSION = 1e-4  # of a frame's pixels: fewer have no image, and are estimated in each frame
+MIN_DISOCCLUSION = 1e-3  # of a frame's pixels: fewer have no image, and are estimated in each frame
 
 
 def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage, RayCount]:
