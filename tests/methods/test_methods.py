@@ -55,12 +55,16 @@ def test_frames_are_those_of_the_reference_up_to_noise(runs, name):
     assert np.isfinite(found.colors).all()
     np.testing.assert_allclose(found.colors.mean(axis=(1, 2)), reference.colors.mean(axis=(1, 2)), rtol=0.05)
     provenance = np.stack([found.record("frames", frame).provenance for frame in range(len(PATH))])
-    numbers, counts = np.unique(provenance, return_counts=True)
-    # Of `decoupled` nearly all that comes into view has an image.
-    reused = {Provenance.REUSED, Provenance.SPECULAR} if name != "reference" else set()
-    disoccluded = {Provenance.DISOCCLUDED} if name == "paper" else set()
-    is_many = counts > 1e-2 * provenance.size
-    assert set(numbers[is_many]) - {Provenance.SLOW} == {Provenance.KEYFRAME} | reused | disoccluded
+    found_kinds = set(np.unique(provenance)) - {Provenance.SLOW}
+    expected = {Provenance.KEYFRAME}
+    if name != "reference":
+        expected |= {Provenance.REUSED, Provenance.SPECULAR}
+    if name == "paper":
+        expected |= {Provenance.DISOCCLUDED}
+    if name == "decoupled":  # nearly all that comes into view has an image
+        assert (provenance == Provenance.DISOCCLUDED).mean() < 1e-2
+        found_kinds -= {Provenance.DISOCCLUDED}
+    assert found_kinds == expected
 
 
 @pytest.mark.parametrize("name", ["decoupled", "paper"])

@@ -12,7 +12,7 @@ from enfilade_blender.image_files import F32
 
 RAW_SPACES = ("Non-Color", "Raw", "Linear Rec.709", "Linear")
 FRAMES = ("SEQUENCE", "MOVIE")  # sources whose pixels Blender has for a node alone, which chooses the frame
-ASSOCIATED = ("WEBP", "JPEG2000")  # kinds of files
+ASSOCIATED = ("WEBP", "JPEG2000")  # kinds of files whose alpha Cycles takes as multiplied into colours
 OPAQUE_DEPTHS = (8, 24)  # bits of a pixel without alpha
 
 
