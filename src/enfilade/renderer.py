@@ -181,6 +181,25 @@ class Bounce:
 
 
 @dataclass(frozen=True)
+class SharpLight:
+    """Light of emitters with sharp shadows that a surface reflects, as lanes.
+
+    Attributes
+    ----------
+    diffuse : Array3f
+        Radiance reflected by the diffuse lobe, divided by the albedo.
+    specular : Array3f
+        Radiance reflected by the specular lobes.
+    unoccluded : Array3f
+        `diffuse` without occluders, of the same points of the emitters.
+    """
+
+    diffuse: Any
+    specular: Any
+    unoccluded: Any
+
+
+@dataclass(frozen=True)
 class BsdfSample:
     """One sampled direction of the diffuse lobe, or of the specular lobes, as lanes.
 
@@ -414,7 +433,7 @@ class LobeRenderer(Renderer, Protocol):
         """Estimate the radiance scattered by the specular lobes; see :meth:`estimate_diffuse`."""
         ...
 
-    def sharp_light(self, point: ShadingPoint, sampler: Any, *, specular: bool = False) -> tuple[Any, Any]:
+    def sharp_light(self, point: ShadingPoint, sampler: Any, *, specular: bool = False) -> SharpLight:
         """Estimate the light of emitters with sharp shadows that the lobes reflect, by next-event estimation.
 
         It is MIS-weighted; the complementary weight is in the emission that samples of the lobes with
@@ -426,13 +445,6 @@ class LobeRenderer(Renderer, Protocol):
         sampler : PaddedSobolSampler
         specular
             Also that of the specular lobes, but for delta lobes.
-
-        Returns
-        -------
-        diffuse : Array3f
-            Radiance reflected by the diffuse lobe, divided by the albedo.
-        specular : Array3f
-            Radiance reflected by the specular lobes.
         """
         ...
 

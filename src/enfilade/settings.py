@@ -351,8 +351,8 @@ class DecoupledSettings(Section):
     )
     denoiser: str = option(
         "balanced",
-        "Quality of Open Image Denoise on decoupled's irradiance images; none: a wavelet filter, on specular "
-        "AOVs, too.",
+        "Quality of Open Image Denoise on decoupled's irradiance images and shadows; none: a wavelet filter, "
+        "on specular AOVs, too, and shadows as they are.",
         choices=("none", "fast", "balanced", "high"),
     )
 

@@ -152,21 +152,27 @@ def test_rays_of_confined_pixels_keep_their_limits():
     assert 0.1 < (np.abs(expected - 0.5 * none) > 1e-3)[is_confined].mean() < 0.9
 
 
-@pytest.mark.parametrize("layers", [1, 2])
+@pytest.mark.parametrize(("layers", "auxiliary"), [(1, 0), (2, 0), (1, 2)])
 @pytest.mark.parametrize("kind", [Estimate, ReconstructedEstimate])
-def test_the_luminance_is_that_of_all_layers_together(kind, layers):
+def test_the_luminance_is_that_of_all_light_together(kind, layers, auxiliary):
     camera, pixels = slide(1, size=(16, 12)).cameras[0], np.arange(0, 192, 3, dtype=np.uint32)
 
     def radiance(_, sampler):
-        return Samples(tuple(Array3f(sampler.next_1d(), sampler.next_1d(), 0.5) for _ in range(layers)))
+        light = [Array3f(sampler.next_1d(), sampler.next_1d(), 0.5) for _ in range(layers)]
+        return Samples((*light, *[Array3f(7.0) * sampler.next_1d()] * auxiliary))
 
-    options = {"pixel_filter": PixelFilter.BOX} if kind is Estimate else {}
-    random = RandomKey(7, 3, Purpose.FILL)
-    whole = kind(camera, pixels, radiance, paths_in_flight=1 << 20, random=random, layers=layers, **options)
+    options = (
+        {"pixel_filter": PixelFilter.BOX}
+        if kind is Estimate
+        else {"reconstructed": min(layers + auxiliary, 2)}
+    )
+    options |= {"paths_in_flight": 1 << 20, "random": RandomKey(7, 3, Purpose.FILL)}
+    whole = kind(camera, pixels, radiance, layers=layers, auxiliary=auxiliary, **options)
     whole.add(6)
     mean, variance = (np.array(of) for of in whole.luminance())
-    np.testing.assert_allclose(mean, luminance(sum(of.color for of in whole.shadings)), rtol=1e-6)
-    np.testing.assert_allclose(variance, sum(of.variance for of in whole.shadings), rtol=1e-6)
+    light = whole.shadings[:layers]
+    np.testing.assert_allclose(mean, luminance(sum(of.color for of in light)), rtol=1e-6)
+    np.testing.assert_allclose(variance, sum(of.variance for of in light), rtol=1e-6)
     some = np.arange(len(pixels)) % 3 == 1
     for of, chosen in zip((mean, variance), whole.luminance(some), strict=True):
         np.testing.assert_array_equal(np.array(chosen), of[some])

@@ -42,7 +42,7 @@ def direct(folder, *shapes, integrator="path"):
     point, sampler = renderer.intersect(rays), one_sequence(COUNT)
     found = renderer.sample_diffuse(point, sampler, soft_only=renderer.has_sharp_light()).direct
     if renderer.has_sharp_light():
-        found = found + renderer.sharp_light(point, sampler)[0]
+        found = found + renderer.sharp_light(point, sampler).diffuse
     return rows(found).mean(dtype=float)
 
 

@@ -10,6 +10,7 @@ from enfilade.camera.pinhole import Camera, look_at
 from enfilade.images import write_exr
 from enfilade.kernels.estimate import Estimate, Samples
 from enfilade.kernels.random import Discrete, one_sequence
+from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from enfilade.renderer import Bounce, PixelFilter, Purpose, RandomKey, Rays
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
@@ -105,7 +106,7 @@ def direct_light(renderer, point, sampler, layers):
 
     state = UInt(0), sample.is_alive, *parts(sample), sample.throughput, sample.direct, sampler
     found = dr.while_loop(state, lambda layer, is_alive, *_: is_alive & (layer < layers), add_layer)[-2]
-    return found + renderer.sharp_light(point, sampler)[0] if renderer.has_sharp_light() else found
+    return found + renderer.sharp_light(point, sampler).diffuse if renderer.has_sharp_light() else found
 
 
 def estimated(radiance, camera, spp, layers):
@@ -184,7 +185,7 @@ def test_the_light_of_a_small_lamp_counts_once(tmp_path, others):
     point = renderer.intersect(rays)
     sample = renderer.sample_diffuse(point, sampler, soft_only=True)
     ahead = renderer.intersect(sample.rays, sample.bounce, sample.is_alive)
-    found = renderer.sharp_light(point, sampler)[0] + sample.direct + sample.throughput * ahead.emission
+    found = renderer.sharp_light(point, sampler).diffuse + sample.direct + sample.throughput * ahead.emission
     whole, _ = renderer.estimate_diffuse(point, sampler)
     assert rows(found).mean(axis=0) == pytest.approx(rows(whole).mean(axis=0), rel=0.01)
 
@@ -197,6 +198,26 @@ def test_samples_of_the_sky_beside_a_sun_are_few_times_empty(tmp_path):
     light = rows(sample.direct)[:, 1]
     assert (light > 0.0).mean() > 0.6  # 0.25 with a single candidate
     assert light.std() < 1.5 * light.mean()  # 2.4
+
+
+@pytest.mark.parametrize("sky", ["sun and sky", "photographed"])
+def test_samples_of_the_sun_have_little_noise(tmp_path, sky):
+    opened(tmp_path, SKIES[sky])
+    scene = mi.load_file(str(tmp_path / "scene.xml"))
+    sun = find_sun(scene.environment())
+    _, radiance, _ = sun.sample(one_sequence(1 << 14))
+    light = rows(Array3f(radiance))[:, 1]
+    assert light.std() < 0.15 * light.mean()
+
+
+@pytest.mark.parametrize("sky", sorted(SHARP))
+def test_occluders_take_a_part_of_the_light(tmp_path, sky):
+    renderer, camera = opened(tmp_path, SKIES[sky]), Camera(VIEW, 50.0, 48, 32)
+    rays = camera_rays(camera, pixel_centres(camera, dr.arange(UInt, 48 * 32)))
+    light = renderer.sharp_light(renderer.intersect(rays), one_sequence(48 * 32))
+    found, unoccluded = rows(light.diffuse), rows(light.unoccluded)
+    assert (found <= unoccluded * 1.00001).all()
+    assert 0.2 * unoccluded.mean() < found.mean() < 0.999 * unoccluded.mean()
 
 
 def bulbs(radiances):
@@ -237,8 +258,10 @@ def test_a_directional_emitter_has_no_noise_but_its_shadow(tmp_path):
         '<rgb name="irradiance" value="2, 1, 1"/></emitter>',
     )
     rays = Rays(Array3f([0.0, 1.0, 1.5], 0.1, 0.0), Array3f(0.0, -1.0, 0.0) + dr.zeros(Array3f, 3))
-    found = rows(renderer.sharp_light(renderer.intersect(rays), one_sequence(3))[0])
-    assert np.allclose(found[1:], np.array([2.0, 1.0, 1.0]) / np.pi, rtol=1e-5)
+    light = renderer.sharp_light(renderer.intersect(rays), one_sequence(3))
+    found, unoccluded = rows(light.diffuse), rows(light.unoccluded)
+    assert np.allclose(unoccluded, np.array([2.0, 1.0, 1.0]) / np.pi, rtol=1e-5)
+    assert np.allclose(found[1:], unoccluded[1:])
     assert not found[0].any()  # inside the cube
 
 

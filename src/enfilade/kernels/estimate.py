@@ -91,7 +91,9 @@ class Estimate:
     random
         Key of the random numbers.
     layers
-        Number of layers of the samples.
+        Number of layers of the samples that are light.
+    auxiliary
+        Number of those behind them, which are not.
     confined
         Pixels of the list whose rays meet a part of the surfaces that they show. None: no such pixels.
     """
@@ -106,6 +108,7 @@ class Estimate:
         pixel_filter: PixelFilter,
         random: RandomKey,
         layers: int = 1,
+        auxiliary: int = 0,
         confined: Confined | None = None,
     ) -> None:
         self._camera = camera
@@ -118,7 +121,9 @@ class Estimate:
         self._next = 0  # index of the next path of each pixel
         self._traced = 0  # paths of all pixels together
         size = max(len(pixels), 1)  # Dr.Jit can't compare empty arrays with a number
-        self._sums = [dr.zeros(Float64, size) for _ in range(2 + 4 * layers)]  # in the order of `_summed`
+        self._layers = layers
+        # In the order of `_summed`.
+        self._sums = [dr.zeros(Float64, size) for _ in range(2 + 4 * (layers + auxiliary))]
 
     def add(self, spp: int, where: npt.NDArray[np.bool_] | None = None) -> None:
         """Trace more paths.
@@ -171,13 +176,16 @@ class Estimate:
     @property
     def shadings(self) -> list[Shading]:
         """The same of every layer."""
-        found = self._means()
+        return self._read(self._means())
+
+    def _read(self, found: list[tuple[Any, Any]]) -> list[Shading]:
+        """Means and variances of layers, (N,)."""
         dr.eval(found)
         n, dropped = len(self._pixels), self.count.dropped
         return [Shading(rows(color)[:n], np.array(variance)[:n], dropped) for color, variance in found]
 
     def luminance(self, where: npt.NDArray[np.bool_] | None = None) -> tuple[Any, Any]:
-        """Mean luminance of pixels, of all layers together, and the sum of the layers' variances.
+        """Mean luminance of pixels, of all light together, and the sum of its layers' variances.
 
         Parameters
         ----------
@@ -189,7 +197,8 @@ class Estimate:
         mean, variance : Float
             A single lane where the list is empty.
         """
-        means = self._means(None if where is None or where.all() else np.flatnonzero(where).astype(np.uint32))
+        chosen = None if where is None or where.all() else np.flatnonzero(where).astype(np.uint32)
+        means = self._means(chosen)[: self._layers]
         color = sum((color for color, _ in means), Array3f(0))
         return dr.dot(color, Array3f(*REC709_LUMINANCE)), sum((variance for _, variance in means), Float(0))
 

@@ -115,7 +115,7 @@ def test_light_that_passes_null_interactions_keeps_its_energy(tmp_path):
         """By final gathering, with the sharp light apart; and by path tracing."""
         gathered = integrator_of(renderer).final_gather(EMPTY, camera_paths(rays, sampler))
         point = renderer.intersect(rays, opaque_only=True)
-        sharp = renderer.sharp_light(point, sampler.fork(1))[0]
+        sharp = renderer.sharp_light(point, sampler.fork(1)).diffuse
         return Samples((sum(gathered.layers) + sharp, sum(renderer.estimate_diffuse(point, sampler.fork(2)))))
 
     ours, reference = estimated(irradiance, camera, 256, layers=2)

@@ -11,7 +11,7 @@ import pytest
 from enfilade.arrays import Array3f, matrix3
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.kernels.estimate import Estimate, Samples
-from enfilade.methods.decoupled.reconstruction import ReconstructedEstimate
+from enfilade.methods.decoupled.reconstruction import ReconstructedEstimate, smoothed
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from twins.reconstruction import reconstructed
 
@@ -186,6 +186,26 @@ def test_paths_that_are_not_finite_do_not_count():
     np.testing.assert_allclose(first.color, 2.0, rtol=1e-6)
     np.testing.assert_allclose(second.color, 3.0, rtol=1e-6)
     assert 0.2 < estimate.count.dropped / estimate.count.rays < 0.4
+
+
+def test_means_of_single_pixels_are_those_of_the_box_filter():
+    def radiance(rays, sampler):
+        return Samples(tuple(half_plane(edge)(rays, sampler) for edge in (11.3, 7.8, 3.1)))
+
+    ours = opened(radiance, auxiliary=2, reconstructed=2)
+    pixels, key = np.arange(WIDTH * HEIGHT, dtype=np.uint32), RandomKey(1, 0, Purpose.DIFFUSE)
+    options = {"paths_in_flight": 1 << 20, "pixel_filter": PixelFilter.BOX, "random": key}
+    box = Estimate(CAMERA, pixels, radiance, auxiliary=2, **options)
+    for estimate in (ours, box):
+        estimate.add(8)
+    assert len(ours.shadings) == 2
+    for found, expected in zip(ours.unfiltered, box.shadings, strict=True):
+        np.testing.assert_allclose(found.color, expected.color, rtol=1e-6)
+    np.testing.assert_allclose(
+        smoothed(ours.unfiltered[1].color.reshape(HEIGHT, WIDTH, 3))[INNER],
+        ours.shadings[1].color.reshape(HEIGHT, WIDTH, 3)[INNER],
+        atol=0.3,
+    )
 
 
 def test_radiance_that_follows_the_place_has_no_offset():

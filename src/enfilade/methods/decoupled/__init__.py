@@ -8,8 +8,8 @@ The modules in the order of the passes of `method.py`:
 * `hash_grid_fill`: surfaces that no image shows (`hash_grid`), then those in mirrors (`virtual_images`,
   `virtual_irradiance`)
 * `irradiance`: final gathering at keyframes and where they are disoccluded, `denoising`, `wavelet`
-* `shading`: camera rays (`adaptive_sampling`, `edges`, `reconstruction`) and specular rays of every frame
-  (`specular_rays`, `surface_edges`, `specular_filter`)
+* `shading`: camera rays (`adaptive_sampling`, `edges`, `reconstruction`, `sharp_shadows`), and specular rays
+  of every frame (`specular_rays`, `surface_edges`, `specular_filter`)
 * `temporal`: accumulation over time, and delivered frames
 """
 

@@ -139,6 +139,28 @@ def denoise_light(
     return bounded
 
 
+def denoise_visibility(geometry: Geometry, visibility: F32, where: Mask, within: Mask, quality: str) -> F32:
+    """Denoise the visible part of emitters, with normals as guides.
+
+    Parameters
+    ----------
+    geometry
+        G-buffer.
+    visibility : (H, W, 3) float32
+        Light over that without occluders.
+    where, within : (H, W) bool
+        Pixels where it is known, and those where it is denoised.
+    quality
+        Of the denoiser.
+
+    Returns
+    -------
+    (H, W, 3) float32
+        0 far from the latter.
+    """
+    return _denoised(visibility, geometry, where, quality, is_mirrored=False, within=within)
+
+
 def correct_light(
     geometry: Geometry, clean: F32, light: Shading, where: Mask, *, levels: int = CORRECTION_LEVELS
 ) -> F32:
@@ -262,14 +284,24 @@ def _without_fireflies(color: F32, where: Mask) -> F32:
     return clamped
 
 
-def _denoised(color: F32, geometry: Geometry, where: Mask, quality: str, *, is_mirrored: bool) -> F32:
+def _denoised(
+    color: F32,
+    geometry: Geometry,
+    where: Mask,
+    quality: str,
+    *,
+    is_mirrored: bool,
+    within: Mask | None = None,
+) -> F32:
     """Denoise the regions of an image that have light; the guides are an albedo of one, and the normals.
+
+    Regions are those of pixels within a mask if there is one.
 
     Where no pixels were sampled, light and guides are continued: a denoiser darkens surfaces beside black
     pixels, and beside an edge of its guides.
     """
     clean = np.zeros_like(color)
-    for part, own in _regions(where & np.any(color, axis=2)):
+    for part, own in _regions(where & np.any(color, axis=2) if within is None else within):
         source = _continued(where[part], is_mirrored=is_mirrored)
         light, normal = color[part][source], geometry.normal[part][source]
         denoised = denoise(light, np.ones_like(light), normal, quality=quality)

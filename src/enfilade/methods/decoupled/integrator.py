@@ -112,14 +112,18 @@ class Integrator:
         Returns
         -------
         Samples
-            Marked where the surface has specular lobes, for :meth:`specular_radiance`.
+            Marked where the surface has specular lobes, for :meth:`specular_radiance`. Two more
+            layers where the cache excludes sharp emitters: irradiance by these over pi, with and without
+            occluders.
         """
         vertex = self.kernels.see(cache, path)
         radiance, deferred = Array3f(vertex.radiance), _Deferred()
         deferred.add_missed(vertex, JITTER)
         for found, lane in self._missed_light(cache, deferred, on_miss):
             scatter_add(radiance, found, lane)
-        return Samples((radiance,), vertex.has_specular)
+        sharp = (*vertex.query.sharp, *vertex.unoccluded)
+        layers = (dr.select(vertex.query.is_needed, of, 0.0) for of in sharp)
+        return Samples((radiance, *layers), vertex.has_specular)
 
     def specular_radiance(self, cache: IrradianceCache, path: Path, on_miss: OnMiss | None = None) -> Samples:
         """Radiance that visible surfaces reflect and transmit by their specular lobes.

@@ -45,7 +45,7 @@ class Decoupled(Method):
     """Irradiance cached at keyframes; visibility, texture, edges and specular lobes in every frame."""
 
     name = "decoupled"
-    revision = 60
+    revision = 61
     needs_lobes = True
     has_tone_curve = True
     settings = (TraceSettings, ViewingSettings, KeyframeSettings, DecoupledSettings)

@@ -125,7 +125,7 @@ def light_by_depth(
             )
             for depth in DEPTHS
         ]
-        sharp = renderer.sharp_light(point, sampler.copy())[0] if has_sharp_light else Array3f(0)
+        sharp = renderer.sharp_light(point, sampler.copy()).diffuse if has_sharp_light else Array3f(0)
         return Samples((*soft, sharp + dr.zeros(Array3f, dr.width(sampler.seed))))
 
     estimate = make_estimate(geometry.camera, chosen, radiance, random, layers=len(DEPTHS) + 1)

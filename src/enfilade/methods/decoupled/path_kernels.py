@@ -57,6 +57,8 @@ class Vertex:
     path : Path
         On its way to the vertex.
     query : CacheQuery
+    unoccluded : tuple of Array3f
+        Of camera rays: the query's irradiance by sharp emitters, without occluders.
     """
 
     radiance: Any
@@ -65,6 +67,7 @@ class Vertex:
     onward: Any
     path: Path
     query: CacheQuery
+    unoccluded: tuple[Any, ...] = ()
 
 
 class PathKernels:
@@ -144,12 +147,14 @@ class PathKernels:
         albedo = point.surfaces.albedo
         is_diffuse = point.surfaces.is_hit & (dr.max(albedo) > MIN_DIFFUSE_ALBEDO)
         sharp: tuple[Any, ...] = ()
+        unoccluded: tuple[Any, ...] = ()
         is_seen = path.bounce is None
         direct = self._renderer.coat_emission(point) if is_seen else Array3f(0)
         if cache.soft_only:  # the camera sees the highlights of sharp emitters, too
             sampler = path.sampler.fork(SHARP_SALT)
-            reflected_sharp, highlights = self._renderer.sharp_light(point, sampler, specular=is_seen)
-            sharp, direct = (reflected_sharp,), direct + highlights
+            light = self._renderer.sharp_light(point, sampler, specular=is_seen)
+            sharp, direct = (light.diffuse,), direct + light.specular
+            unoccluded = (light.unoccluded,) if is_seen else ()
         query = CacheQuery(
             position=point.position,
             normal=point.surfaces.normal,
@@ -160,7 +165,8 @@ class PathKernels:
             sharp=sharp,
         )
         reflected, is_miss = query_view(cache, query)
-        vertex = Vertex(reflected, is_miss, Bool(point.has_specular), _surviving(path, point), path, query)
+        onward = _surviving(path, point)
+        vertex = Vertex(reflected, is_miss, Bool(point.has_specular), onward, path, query, unoccluded)
         # Where a lobe absorbs the path, its direction is undefined, and so may be the environment's emission.
         emitted = dr.select(path.is_active, path.throughput * (point.emission + direct), 0.0)
         return Array3f(emitted), vertex
@@ -273,7 +279,7 @@ class PathKernels:
     def _sharp_light(self, path: Path) -> Any:
         """Irradiance over pi at the next surface, by emitters that cast sharp shadows; Array3f."""
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
-        sharp, _ = self._renderer.sharp_light(point, path.sampler.fork(SHARP_SALT))
+        sharp = self._renderer.sharp_light(point, path.sampler.fork(SHARP_SALT)).diffuse
         return Array3f(dr.select(path.is_active, sharp, 0.0))
 
     def _estimate(
@@ -292,7 +298,7 @@ class PathKernels:
         light = self._renderer.estimate_diffuse(point, sampler, path_depth, guide, soft_only=is_divided)
         irradiance = [Array3f(sum(light))]
         if is_divided:
-            sharp, _ = self._renderer.sharp_light(point, path.sampler.fork(SHARP_SALT))
+            sharp = self._renderer.sharp_light(point, path.sampler.fork(SHARP_SALT)).diffuse
             irradiance.insert(0, Array3f(irradiance[0] + sharp))
         scales = [weight_after(of, path.depth) for of in depth_weights[: len(irradiance)]]
         if path.bounce is None:  # in the hash grid it is that of a path after one bounce

@@ -13,6 +13,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 import numpy.typing as npt
+import scipy.ndimage
 
 from enfilade.arrays import Array3f, Bool, Float, Int, UInt, lanes, opaque
 from enfilade.camera.pinhole import Camera
@@ -24,7 +25,7 @@ from enfilade.kernels.estimate import (
     Samples,
     is_finite,
 )
-from enfilade.records import F32
+from enfilade.records import F32, Shading
 from enfilade.renderer import PixelFilter, RandomKey
 
 NEIGHBOURS = (-1, 0, 1)  # pixels, along each axis: the filter's radius is one and a half
@@ -43,8 +44,11 @@ class ReconstructedEstimate(Estimate):
 
     Parameters
     ----------
-    camera, pixels, radiance, paths_in_flight, random, layers
+    camera, pixels, radiance, paths_in_flight, random, layers, auxiliary
         As of :class:`Estimate`.
+    reconstructed
+        Number of layers that are reconstructed, the first ones; None: those that are light.
+        :attr:`unfiltered` has all.
     background : sequence of (H, W, 3) float32
         One a layer: values of pixels that have no paths. None: such pixels do not contribute.
     """
@@ -58,6 +62,8 @@ class ReconstructedEstimate(Estimate):
         paths_in_flight: int,
         random: RandomKey,
         layers: int = 1,
+        auxiliary: int = 0,
+        reconstructed: int | None = None,
         background: Sequence[F32] | None = None,
     ) -> None:
         super().__init__(
@@ -68,21 +74,29 @@ class ReconstructedEstimate(Estimate):
             pixel_filter=PixelFilter.BOX,
             random=random,
             layers=layers,
+            auxiliary=auxiliary,
         )
+        self._reconstructed = layers if reconstructed is None else reconstructed
         size = max(len(self._pixels), 1)
         # Of each neighbour in the order of `_neighbours`: the weights, and the weighted colours by layer.
         self._weighted = [
-            (dr.zeros(Float, size), [dr.zeros(Array3f, size) for _ in range(layers)]) for _ in _neighbours()
+            (dr.zeros(Float, size), [dr.zeros(Array3f, size) for _ in range(self._reconstructed)])
+            for _ in _neighbours()
         ]
         place = np.full(self._camera.width * self._camera.height, len(self._pixels), np.uint32)
         place[self._pixels] = np.arange(len(self._pixels), dtype=np.uint32)
         self._place = lanes(place)  # index of each pixel in the list; the list's length if absent
         self._background = None if background is None else [lanes(layer) for layer in background]
 
+    @property
+    def unfiltered(self) -> list[Shading]:
+        """Means of the paths of each pixel alone, of every layer, (N,): their noise is not correlated."""
+        return self._read(super()._means())
+
     def _accumulate(self, samples: Samples, offset: Any, target: Any, count: int) -> None:
         dr.eval(samples.layers, offset)  # else both sums would trace the paths
         super()._accumulate(samples, offset, target, count)
-        sums = _weighted_sums(samples, offset, dr.width(target), count)
+        sums = _weighted_sums(samples, self._reconstructed, offset, dr.width(target), count)
         for totals, found in zip(self._weighted, sums, strict=True):
             for total, value in zip(_flat(totals), _flat(found), strict=True):
                 dr.scatter_add(total, value, target, mode=dr.ReduceMode.NoConflicts)
@@ -95,7 +109,7 @@ class ReconstructedEstimate(Estimate):
         width, height = opaque(self._camera.width, Int), opaque(self._camera.height, Int)
         row = Int(pixel // UInt(width))
         column = Int(pixel) - row * width
-        variances = [variance for _, variance in super()._means()]
+        variances = [variance for _, variance in super()._means()[: self._reconstructed]]
         dr.eval(variances)
 
         # Add the means of the nine pixels, or their background.
@@ -130,6 +144,14 @@ class ReconstructedEstimate(Estimate):
         return [(scale * c, scale * scale * v) for c, v in zip(colors, squared, strict=True)]
 
 
+def smoothed(image: F32) -> F32:
+    """An image, (H, W, 3), filtered as paths of equal weight in each pixel are."""
+    weights = [_integral(offset) for offset in NEIGHBOURS]
+    for axis in (0, 1):
+        image = scipy.ndimage.correlate1d(image, weights, axis, mode="nearest")
+    return image
+
+
 def _neighbours() -> Iterator[tuple[int, int]]:
     """Offsets of the pixels that a path contributes to, row by row."""
     return ((dx, dy) for dy in NEIGHBOURS for dx in NEIGHBOURS)
@@ -156,15 +178,17 @@ def _flat(totals: tuple[Any, list[Any]]) -> list[Any]:
     return [weight, *(channel for color in colors for channel in color)]
 
 
-def _weighted_sums(samples: Samples, offset: Any, pixels: int, count: int) -> list[tuple[Any, list[Any]]]:
+def _weighted_sums(
+    samples: Samples, reconstructed: int, offset: Any, pixels: int, count: int
+) -> list[tuple[Any, list[Any]]]:
     """Sums over the `count` paths of each of some pixels, weighted by the filters of its neighbours.
 
     Returns
     -------
     list of (Float, list of Array3f)
-        Of each neighbour: the weights, and the weighted colours of every layer.
+        Of each neighbour: the weights, and the weighted colours of the layers that are reconstructed.
     """
-    layers, is_valid = [Array3f(color) for color in samples.layers], is_finite(samples)
+    layers, is_valid = [Array3f(color) for color in samples.layers[:reconstructed]], is_finite(samples)
     dr.eval(layers, is_valid)
     number = opaque(count)
     first = dr.arange(UInt, pixels) * number

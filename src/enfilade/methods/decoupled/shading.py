@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from enfilade.arrays import release_memory, to_half
-from enfilade.kernels.estimate import Estimate
 from enfilade.kernels.tone import luminance
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.adaptive_sampling import AdaptiveSampling
 from enfilade.methods.decoupled.edges import dilated, is_outline, small_emitter_pixels
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
+from enfilade.methods.decoupled.reconstruction import ReconstructedEstimate
 from enfilade.methods.decoupled.records import ShadedFrame
+from enfilade.methods.decoupled.sharp_shadows import smooth_shadows
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.specular_rays import shade_specular
 from enfilade.records import U8, Geometry, Mask, Provenance
@@ -25,7 +28,12 @@ def shade(shot: ShotContext, frame: int) -> Output:
     # Trace camera rays, then specular rays where they meet specular lobes.
     cache = shot.shading_cache(frame)
     diffuse, refined = _shade_diffuse(shot, frame, cache)
-    diffuse_image = diffuse.shading.to_image(np.ones_like(refined))
+    diffuse_image, *sharp = (of.to_image(np.ones_like(refined)) for of in diffuse.shadings)
+    quality = shot.settings.denoiser
+    if sharp and quality != "none":
+        light = (of.to_image(np.ones_like(refined)).color for of in diffuse.unfiltered[1:])
+        change = smooth_shadows(geometry, sharp[0].color, *light, quality=quality)
+        diffuse_image = replace(diffuse_image, color=diffuse_image.color + change)
     seen, count = diffuse.is_marked.reshape(refined.shape), diffuse.count
     del diffuse  # its sums take 200 bytes a pixel
     release_memory()
@@ -50,17 +58,24 @@ def shade(shot: ShotContext, frame: int) -> Output:
     return Output({frame: shaded}, {"rays": rays, "dropped": (count + specular.count).dropped})
 
 
-def _shade_diffuse(shot: ShotContext, frame: int, cache: IrradianceCache) -> tuple[Estimate, Mask]:
-    """Emission, diffuse reflection and highlights of sharp emitters; where it has more rays, (H, W)."""
+def _shade_diffuse(
+    shot: ShotContext, frame: int, cache: IrradianceCache
+) -> tuple[ReconstructedEstimate, Mask]:
+    """Emission, diffuse reflection and highlights of sharp emitters; where it has more rays, (H, W).
+
+    Auxiliary layers, if the scene has sharp emitters, are their irradiance, and that without occluders.
+    """
     walk, settings = shot.walk, shot.settings
     geometry, sampling = walk.view(frame).geometry, AdaptiveSampling.of(walk)
-    everywhere = np.ones(geometry.shape_index.shape, np.bool_)
+    everywhere, is_divided = np.ones(geometry.shape_index.shape, np.bool_), shot.renderer.has_sharp_light()
     estimate = shot.reconstructed_estimate(
         geometry.camera,
         everywhere,
         lambda rays, sampler: shot.integrator.diffuse_radiance(cache, shot.spawn(frame, rays, sampler)),
         walk.random(frame, Purpose.DIFFUSE),
         layers=1,
+        auxiliary=2 * is_divided,
+        reconstructed=1 + is_divided,
     )
     estimate.add(settings.min_spp)
 

@@ -160,6 +160,8 @@ class ShotContext:
         random: RandomKey,
         *,
         layers: int,
+        auxiliary: int = 0,
+        reconstructed: int | None = None,
         background: Sequence[F32] | None = None,
     ) -> ReconstructedEstimate:
         """The same of pixels that are reconstructed; arguments as of :class:`ReconstructedEstimate`."""
@@ -170,6 +172,8 @@ class ShotContext:
             paths_in_flight=self.walk.settings[LimitSettings].paths_in_flight,
             random=random,
             layers=layers,
+            auxiliary=auxiliary,
+            reconstructed=reconstructed,
             background=background,
         )
 

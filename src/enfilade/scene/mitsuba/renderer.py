@@ -34,6 +34,7 @@ from enfilade.renderer import (
     Rays,
     SceneDescription,
     ShadingPoint,
+    SharpLight,
     Surfaces,
 )
 from enfilade.scene.mitsuba.bsdfs import why_opaque
@@ -235,7 +236,7 @@ class MitsubaRenderer:
         sample = self._transport.sample_specular(point, sampler)
         return self._transport.estimate(sample, sampler, path_depth, path_depth)
 
-    def sharp_light(self, point: ShadingPoint, sampler: Any, *, specular: bool = False) -> tuple[Any, Any]:
+    def sharp_light(self, point: ShadingPoint, sampler: Any, *, specular: bool = False) -> SharpLight:
         """See :meth:`enfilade.renderer.LobeRenderer.sharp_light`."""
         return self._transport.sharp_light(point, sampler, specular=specular)
 

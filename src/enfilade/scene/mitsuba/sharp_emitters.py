@@ -92,7 +92,7 @@ class SharpEmitters:
         evaluate: Callable[[Any], Sequence[tuple[Any, Any]]],
         factors: Sequence[Any],
         active: Any,
-    ) -> list[Any]:
+    ) -> tuple[list[Any], Any]:
         """Radiance that lobes of a surface reflect of the light of sharp emitters, MIS-weighted.
 
         Up to :data:`SHADOW_RAYS` emitters have a shadow ray each. More are divided into groups with one
@@ -112,12 +112,14 @@ class SharpEmitters:
 
         Returns
         -------
-        list of Array3f
+        light : list of Array3f
             Of each lobe.
+        unoccluded : Array3f
+            Of the first lobe, without occluders.
         """
         groups = min(self._sharp_count, SHADOW_RAYS)
         size = self._sharp_count / max(groups, 1)  # emitters of a group
-        found = [Array3f(0)] * len(factors)
+        found, unoccluded = [Array3f(0)] * len(factors), Array3f(0)
         for group in range(groups):
 
             def candidate(place: Any, group: int = group) -> tuple[Target, Contributions]:
@@ -133,13 +135,15 @@ class SharpEmitters:
 
             target, chosen = resample(candidate, min(math.ceil(size), MOST_CANDIDATES), sampler, factors)
             found = _added(found, self._shadow_rays.unoccluded(si, target, chosen, active))
+            unoccluded += dr.select(active, chosen[0], 0.0)
         if self._sun is not None:
             direction, radiance, pdf = self._sun.sample(sampler)
             point = si.p + direction * (2.0 * dr.norm(self._scene.bbox().extents()))
             target = Target(point, Bool(False))
             contributions = _weighted(evaluate(direction), radiance, pdf)
             found = _added(found, self._shadow_rays.unoccluded(si, target, contributions, active))
-        return found
+            unoccluded += dr.select(active, contributions[0], 0.0)
+        return found, unoccluded
 
     def sample_soft(self, si: Any, sample_point: Any, active: Any) -> tuple[Any, Any]:
         """Sample the soft emitters, as ``scene.sample_emitter_direction`` does all.

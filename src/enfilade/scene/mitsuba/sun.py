@@ -22,7 +22,10 @@ SAMPLES = 4096  # of the environment's own density, beside these
 MAX_RADIUS = math.radians(2.5)  # the disc seen from the Earth has 0.27 degrees; many photographs blur it
 MIN_SHARE = 0.05  # of the sky's flux
 CONTAINED = 0.99  # of the flux within that radius, to be on the map
-TEXELS = 64  # of the map along each axis
+MARGIN = 1.0 / 32.0  # beyond it, as a part of the radius in which the flux is compared
+TEXELS = 256  # of the map along each axis
+SUBDIVIDED = 4  # parts of a texel along each axis, whose mean is its weight
+LEAST_BESIDE = 0.25  # of the largest weight beside it: bounds the noise of texels that the sun's outline cuts
 
 
 @dataclass(frozen=True)
@@ -124,12 +127,13 @@ def find_sun(environment: Any) -> Sun | None:
     distance = np.hypot(x - x_centre, y - y_centre)
     order = np.argsort(distance)
     contained = np.cumsum(excess[order]) / excess.sum()
-    radius = distance[order][np.searchsorted(contained, CONTAINED)] + 2.0 * limit / TEXELS
+    radius = distance[order][np.searchsorted(contained, CONTAINED)] + MARGIN * limit
     frame = _facing(np.array(frame.to_world(mi.Vector3f(x_centre, y_centre, 1.0))).ravel())
-    _, _, luminance = _map(environment, frame, float(radius))
-    # Texels at the outline may be brighter elsewhere than at their centres.
-    weights = scipy.ndimage.maximum_filter(luminance.reshape(TEXELS, TEXELS), 3)
-    texels = Discrete.of(np.maximum(weights, 1e-6 * weights.max()).ravel().astype(np.float64))
+    _, _, luminance = _map(environment, frame, float(radius), SUBDIVIDED)
+    # Texels at the outline may be brighter elsewhere than where they were evaluated.
+    weights = luminance.reshape(TEXELS, SUBDIVIDED, TEXELS, SUBDIVIDED).mean(axis=(1, 3), dtype=np.float64)
+    least = np.maximum(LEAST_BESIDE * scipy.ndimage.maximum_filter(weights, 3), 1e-6 * weights.max())
+    texels = Discrete.of(np.maximum(weights, least).ravel())
     return Sun(environment, frame, opaque(float(radius)), texels)
 
 
@@ -146,10 +150,11 @@ def _brightest(environment: Any, directions: npt.NDArray[np.float64], sky: F32) 
     return directions[np.argmax(sky)]
 
 
-def _map(environment: Any, frame: Any, extent: float) -> tuple[F32, F32, F32]:
-    """Coordinates of the texels of a map, and the luminance at their centres, (N,) each."""
-    along = (((np.arange(TEXELS) + 0.5) * (2.0 / TEXELS) - 1.0) * extent).astype(np.float32)
-    x, y = np.tile(along, TEXELS), np.repeat(along, TEXELS)
+def _map(environment: Any, frame: Any, extent: float, subdivided: int = 1) -> tuple[F32, F32, F32]:
+    """Coordinates of the texels of a map, or of parts of them, and the luminance there, (N,) each."""
+    parts = subdivided * TEXELS
+    along = (((np.arange(parts) + 0.5) * (2.0 / parts) - 1.0) * extent).astype(np.float32)
+    x, y = np.tile(along, parts), np.repeat(along, parts)
     directions = mi.Vector3f(lanes(x), lanes(y), 1.0)
     return x, y, _luminance(environment, frame.to_world(dr.normalize(directions)))
 

@@ -12,7 +12,7 @@ import mitsuba as mi
 from enfilade.arrays import Array3f, Bool, UInt
 from enfilade.kernels.guiding import GuidedLobe, PathGuide
 from enfilade.records import MIN_DIFFUSE_ALBEDO
-from enfilade.renderer import Bounce, Branch, BsdfSample, Rays, ShadingPoint
+from enfilade.renderer import Bounce, Branch, BsdfSample, Rays, ShadingPoint, SharpLight
 from enfilade.scene.mitsuba.lobes import Lobes
 from enfilade.scene.mitsuba.resampling import MOST_CANDIDATES, Contributions, resample
 from enfilade.scene.mitsuba.shadow_rays import NULL_LAYERS, ShadowRays, Target
@@ -137,7 +137,7 @@ class LightTransport:
         )
         return met, unweighted, weighted, is_rare
 
-    def sharp_light(self, point: ShadingPoint, sampler: Any, *, specular: bool = False) -> tuple[Any, Any]:
+    def sharp_light(self, point: ShadingPoint, sampler: Any, *, specular: bool = False) -> SharpLight:
         """See :meth:`enfilade.renderer.LobeRenderer.sharp_light`."""
         si, bsdf, albedo = _lobes_of(point)
         is_diffuse = si.is_valid() & (dr.max(albedo) > MIN_DIFFUSE_ALBEDO)
@@ -152,8 +152,8 @@ class LightTransport:
             return lobes
 
         active, factors = is_diffuse | is_glossy, [albedo, 1.0][: 2 if specular else 1]
-        found = self.sharp_emitters.estimate(si, sampler, evaluate, factors, active)
-        return found[0], found[1] if specular else Array3f(0)
+        (diffuse, *others), unoccluded = self.sharp_emitters.estimate(si, sampler, evaluate, factors, active)
+        return SharpLight(diffuse, others[0] if specular else Array3f(0), unoccluded)
 
     def coat_emission(self, point: ShadingPoint) -> Any:
         """See :meth:`enfilade.renderer.LobeRenderer.coat_emission`."""
