@@ -32,7 +32,7 @@ def shade(shot: ShotContext, frame: int) -> Output:
     quality = shot.settings.denoiser
     if sharp and quality != "none":
         light = (of.to_image(np.ones_like(refined)).color for of in diffuse.unfiltered[1:])
-        change = smooth_shadows(geometry, sharp[0].color, *light, quality=quality)
+        change = smooth_shadows(geometry, sharp[0], *light, quality=quality)
         diffuse_image = replace(diffuse_image, color=diffuse_image.color + change)
     seen, count = diffuse.is_marked.reshape(refined.shape), diffuse.count
     del diffuse  # its sums take 200 bytes a pixel

@@ -10,29 +10,32 @@ import numpy as np
 import scipy.ndimage
 
 from enfilade.kernels.tone import luminance
-from enfilade.methods.decoupled.denoising import denoise_visibility
+from enfilade.methods.decoupled.adaptive_sampling import AROUND
+from enfilade.methods.decoupled.denoising import NOISE_SHARE, denoise_visibility
 from enfilade.methods.decoupled.reconstruction import smoothed
 from enfilade.methods.decoupled.surface_edges import surface_edges
-from enfilade.records import F32, Geometry
+from enfilade.records import F32, Geometry, Shading
 
-AROUND = 5  # pixels: the window in which visibility is compared
+WINDOW = 5  # pixels: the window in which visibility is compared
 CONTRAST = 0.02  # of visibility in the window, below which there is no penumbra
 
 
 def smooth_shadows(
-    geometry: Geometry, irradiance: F32, unfiltered: F32, unoccluded: F32, *, quality: str
+    geometry: Geometry, irradiance: Shading, unfiltered: F32, unoccluded: F32, *, quality: str
 ) -> F32:
     """What denoised visibility of sharp emitters adds to the radiance of a frame.
 
     It is 0 where all of the window is lit alike, at edges of surfaces, and where there is no diffuse lobe.
-    Denoised visibility is limited to what was found in the window.
+    Denoised visibility is limited to what was found in the window. Where the denoiser changes more than noise
+    explains, as at sharp edges and narrow shadows, the change is reduced by the ratio of the two variances,
+    as by a Wiener filter.
 
     Parameters
     ----------
     geometry
         G-buffer of the frame.
-    irradiance : (H, W, 3) float32
-        By sharp emitters, over pi, as it is in the frame: reconstructed.
+    irradiance
+        By sharp emitters, over pi, as it is in the frame: reconstructed, of shape (H, W).
     unfiltered, unoccluded : (H, W, 3) float32
         Means over each pixel alone: of the same, and of that without occluders.
     quality
@@ -53,14 +56,14 @@ def smooth_shadows(
 
     # Denoise it where it varies.
     low, high = (
-        extreme(np.where(where[..., None], visibility, beyond), (AROUND, AROUND, 1))
+        extreme(np.where(where[..., None], visibility, beyond), (WINDOW, WINDOW, 1))
         for extreme, beyond in (
             (scipy.ndimage.minimum_filter, np.float32(np.inf)),
             (scipy.ndimage.maximum_filter, np.float32(-np.inf)),
         )
     )
     within = where & np.any(high - low > CONTRAST, axis=2)
-    change = np.zeros_like(irradiance)
+    change = np.zeros_like(irradiance.color)
     if not within.any():
         return change
     clean = denoise_visibility(geometry, visibility, where, within, quality)
@@ -68,5 +71,10 @@ def smooth_shadows(
     # Filter its product with the light as pixels are.
     light = unfiltered.copy()
     light[within] = np.clip(clean[within], low[within], high[within]) * unoccluded[within]
-    change[within] = geometry.albedo[within] * (smoothed(light)[within] - irradiance[within])
-    return change
+    change[within] = smoothed(light)[within] - irradiance.color[within]
+
+    # Compare the change with the noise.
+    noise = scipy.ndimage.uniform_filter(np.float32(NOISE_SHARE) * irradiance.variance * within, AROUND)
+    squared = scipy.ndimage.uniform_filter(np.square(luminance(change)), AROUND)
+    kept = np.divide(noise, squared, out=np.ones_like(squared), where=squared > noise)
+    return geometry.albedo * change * kept[..., None]
