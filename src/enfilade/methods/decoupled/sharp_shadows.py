@@ -73,8 +73,9 @@ def smooth_shadows(
     light[within] = np.clip(clean[within], low[within], high[within]) * unoccluded[within]
     change[within] = smoothed(light)[within] - irradiance.color[within]
 
-    # Compare the change with the noise.
+    # Compare the change with the noise. Where both are zero, sums may be just below it.
     noise = scipy.ndimage.uniform_filter(np.float32(NOISE_SHARE) * irradiance.variance * within, AROUND)
     squared = scipy.ndimage.uniform_filter(np.square(luminance(change)), AROUND)
+    noise = np.maximum(noise, np.float32(0))
     kept = np.divide(noise, squared, out=np.ones_like(squared), where=squared > noise)
     return geometry.albedo * change * kept[..., None]
