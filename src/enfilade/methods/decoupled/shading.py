@@ -35,7 +35,7 @@ def shade(shot: ShotContext, frame: int) -> Output:
         change = smooth_shadows(geometry, sharp[0], *light, quality=quality)
         diffuse_image = replace(diffuse_image, color=diffuse_image.color + change)
     seen, count = diffuse.is_marked.reshape(refined.shape), diffuse.count
-    del diffuse  # its sums take 200 bytes a pixel
+    del diffuse  # its sums take 200 to 400 bytes a pixel
     release_memory()
     virtual = shot.virtual_images.find(geometry) if seen.any() else []
     specular = shade_specular(shot, frame, cache, seen, virtual, luminance(diffuse_image.color))
