@@ -121,11 +121,11 @@ def denoise_light(
     most = np.float32(outlier)
     positive = np.maximum(light.color, np.float32(0))
     seen = positive if clamped is None else _without_fireflies(positive, clamped)
-    above = _denoised(seen, geometry, where, quality, is_mirrored=is_mirrored)
+    above = denoise_regions(seen, geometry, where, quality, is_mirrored=is_mirrored)
     negative = positive - light.color
     is_counted = _in_blocks(negative.sum(axis=2)) > NEGLIGIBLE * _in_blocks(positive.sum(axis=2))
     negative[~_of_pixels(is_counted, where.shape)] = 0.0
-    below = _denoised(negative, geometry, where, quality, is_mirrored=is_mirrored)
+    below = denoise_regions(negative, geometry, where, quality, is_mirrored=is_mirrored)
 
     # Correct it by the difference from the input.
     guide, clean, magnitude = guide_of(geometry, where), above - below, above + below
@@ -137,28 +137,6 @@ def denoise_light(
         if excess.any():
             bounded = _with_excess(bounded, excess, magnitude * where[..., None], guide)
     return bounded
-
-
-def denoise_visibility(geometry: Geometry, visibility: F32, where: Mask, within: Mask, quality: str) -> F32:
-    """Denoise the visible part of emitters, with normals as guides.
-
-    Parameters
-    ----------
-    geometry
-        G-buffer.
-    visibility : (H, W, 3) float32
-        Light over that without occluders.
-    where, within : (H, W) bool
-        Pixels where it is known, and those where it is denoised.
-    quality
-        Of the denoiser.
-
-    Returns
-    -------
-    (H, W, 3) float32
-        0 far from the latter.
-    """
-    return _denoised(visibility, geometry, where, quality, is_mirrored=False, within=within)
 
 
 def correct_light(
@@ -284,7 +262,7 @@ def _without_fireflies(color: F32, where: Mask) -> F32:
     return clamped
 
 
-def _denoised(
+def denoise_regions(
     color: F32,
     geometry: Geometry,
     where: Mask,
@@ -295,10 +273,22 @@ def _denoised(
 ) -> F32:
     """Denoise the regions of an image that have light; the guides are an albedo of one, and the normals.
 
-    Regions are those of pixels within a mask if there is one.
-
     Where no pixels were sampled, light and guides are continued: a denoiser darkens surfaces beside black
     pixels, and beside an edge of its guides.
+
+    Parameters
+    ----------
+    color : (H, W, 3) float32
+        0 or more.
+    geometry, where, quality, is_mirrored
+        As of :func:`denoise_light`.
+    within : (H, W) bool
+        Pixels whose regions are denoised; None: those that have light.
+
+    Returns
+    -------
+    (H, W, 3) float32
+        0 outside of the regions.
     """
     clean = np.zeros_like(color)
     for part, own in _regions(where & np.any(color, axis=2) if within is None else within):

@@ -11,7 +11,7 @@ import scipy.ndimage
 
 from enfilade.kernels.tone import luminance
 from enfilade.methods.decoupled.adaptive_sampling import AROUND
-from enfilade.methods.decoupled.denoising import NOISE_SHARE, denoise_visibility
+from enfilade.methods.decoupled.denoising import NOISE_SHARE, denoise_regions
 from enfilade.methods.decoupled.reconstruction import smoothed
 from enfilade.methods.decoupled.surface_edges import surface_edges
 from enfilade.records import F32, Geometry, Shading
@@ -66,7 +66,7 @@ def smooth_shadows(
     change = np.zeros_like(irradiance.color)
     if not within.any():
         return change
-    clean = denoise_visibility(geometry, visibility, where, within, quality)
+    clean = denoise_regions(visibility, geometry, where, quality, is_mirrored=False, within=within)
 
     # Filter its product with the light as pixels are.
     light = unfiltered.copy()
